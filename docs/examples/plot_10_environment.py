@@ -2,10 +2,10 @@
 A drill as an environment for a learning agent
 ==============================================
 
-A drill string stores twist between its drive and its bit. The dry friction of the bit on the rock falls with the
-speed, and under a constant torque the bit sticks and slips. The class below has the form of an environment of
-gymnasium, ``reset`` and ``step``, with a torque command that is held between two steps. It runs without gymnasium, and
-registers itself if gymnasium is there.
+A drill string stores twist between its drive and its bit. The dry friction of the bit on the rock decreases with the
+speed. Under a constant torque the bit therefore sticks and slips. The class below has the methods ``reset`` and
+``step`` of an environment of gymnasium. Its action is a torque that is constant between two calls of ``step``. The
+class also works without gymnasium. If gymnasium is installed, the class registers itself.
 """
 
 import matplotlib.pyplot as plt
@@ -88,7 +88,8 @@ if gymnasium and "hybridsim/Drill-v0" not in gymnasium.registry:
     gymnasium.register("hybridsim/Drill-v0", entry_point=DrillEnv)
 
 # %%
-# Two rules stand in for an agent: a constant torque, and one that lets the drive give way to the twist (soft torque).
+# Two simple rules replace an agent. One rule is a constant torque. The other rule reduces the torque when the twist
+# grows (soft torque).
 
 
 def constant(observation):

@@ -2,10 +2,10 @@
 A slider over a parameter
 =========================
 
-A run of this oscillator takes less than a millisecond, so a notebook can simulate it again at every move of a slider.
-The slider needs the package ``ipywidgets``. Without it, the script draws one picture. The block is released at 1 m from
-the end of its spring. Each half swing takes ``pi`` seconds and loses ``2 mu g`` of the amplitude (m = k = 1), until the
-spring cannot overcome friction.
+A run of this oscillator takes less than a millisecond. A notebook can therefore simulate it again at every move of a
+slider. The slider needs the package ``ipywidgets``. Without this package, the script draws one picture. The block is
+released 1 m from the end of its spring. Each half swing takes ``pi`` seconds and reduces the amplitude by ``2 mu g``
+(m = k = 1), until the spring cannot overcome friction.
 """
 
 import hybridsim as hs

@@ -2,9 +2,9 @@
 A block that sticks and slips
 =============================
 
-A block on a table is pulled over a spring whose far end moves at a constant speed. Friction at rest
-is higher than in motion, so the block moves in jerks: it holds until the spring pulls with ``mu_s m
-g``, and each hold lasts ``2 (mu_s - mu_k) m g/(k V)``.
+A spring pulls a block on a table. The far end of the spring moves at the constant speed V. Static friction is higher
+than kinetic friction, so that the block moves in jerks. The block sticks until the spring force is ``mu_s m g``. Each
+stick after the first lasts ``2 (mu_s - mu_k) m g/(k V)``.
 """
 
 import hybridsim as hs
@@ -35,6 +35,6 @@ print("each hold, s:", [f"{duration:.12f}" for duration in held])
 print("expected,  s:", f"{2 * 0.1 * 9.81 / (100 * 0.02):.12f}")
 
 # %%
-# The strip below the curves shows the modes; the force follows the spring while the block holds.
+# The strip below the curves shows the modes. In stick the friction force equals the spring force.
 
 plot.save(plot.time_history(sol, ["stretch", "v", "f"]), "stick-slip.png")

@@ -2,8 +2,8 @@
 A friction law of one's own
 ===========================
 
-Friction that falls with speed and rises again, ``mu(v) = mu0/(1 + delta |v|) + eta |v|``, under a
-load that grows with the displacement. ``slip`` is the magnitude of the force in motion, ``stick``
+The friction of this law first decreases and then increases with the speed, as ``mu(v) = mu0/(1 + delta |v|) + eta
+|v|``. The normal load grows with the displacement. ``slip`` is the magnitude of the force in motion, and ``stick`` is
 the limit at rest.
 """
 
@@ -20,8 +20,8 @@ values = {"mu0": 0.5, "delta": 4.0, "eta": 0.1}
 plot.save(plot.friction_law(law, values, speed=3), "law.png")
 
 # %%
-# On a belt that carries a mass against a spring, it makes the mass stick and slip. The contact's
-# velocity is that of the mass relative to the belt, and its load is an expression of the states.
+# On a moving belt, a mass on a spring sticks and slips under this law. The velocity of the contact is the velocity of
+# the mass relative to the belt. The load of the contact is an expression of the states.
 
 model = hs.Model(
     "mass-on-belt",

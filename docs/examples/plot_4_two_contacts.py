@@ -2,9 +2,8 @@
 Two blocks on a belt
 ====================
 
-Two blocks, coupled by a spring, each on the belt: after every event both contacts are decided
-together, whatever the order in which they are declared. The energy that the springs and masses hold
-changes by what the contacts do, to rounding.
+Two blocks on a belt are coupled by a spring. After every event both contacts are decided together, and the order of
+declaration has no effect. The change of the kinetic and elastic energy equals the work of the contacts, to rounding.
 """
 
 import numpy as np
@@ -29,14 +28,14 @@ sol = hs.simulate(system, (0, 40))
 print(sol.status, len(sol.events), "changes of mode")
 
 # %%
-# The same as an ordinary model, whose runs can be drawn.
+# This is the system as an ordinary model, whose runs can be drawn.
 
 sol = hs.simulate(system.to_model(), (0, 40))
 plot.save(plot.time_history(sol, ["q1", "q2", "v1", "v2"]), "blocks.png")
 
 # %%
-# What the contacts give, the integral of -f q' over time, against the change of the energy: Gauss
-# points in every piece between two events.
+# The work of the contacts is the integral of -f q' over time, by Gauss quadrature between any two events. It is
+# compared with the change of the energy.
 
 nodes, weights = np.polynomial.legendre.leggauss(20)
 ends = np.unique([0.0, *(event.t for event in sol.events), 40.0])

@@ -2,9 +2,8 @@
 Why a body on a slope creeps under tanh
 =======================================
 
-A block rests on a slope because friction can hold it. Smoothed friction, ``mu N tanh(v/v0)``, has
-no force at rest: the block creeps at the speed at which the smoothed force carries it, ``v0
-artanh(tan(alpha)/mu)``.
+Friction can hold a block on a slope. The smoothed friction force ``mu N tanh(v/v0)`` is zero at rest. With this force
+the block creeps, at the speed ``v0 artanh(tan(alpha)/mu)``.
 """
 
 from math import atanh

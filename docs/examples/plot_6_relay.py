@@ -2,8 +2,8 @@
 A relay that slides
 ===================
 
-A relay on ``s = x + v/2`` drives a mass. Where both fields point at the surface ``s = 0`` the state
-slides along it (Filippov): there is no chattering, and the motion on it is ``x' = -2 x``.
+A relay on ``s = x + v/2`` drives a mass. If the motion leads to the surface ``s = 0`` from both sides, the state slides
+along the surface (Filippov). The relay does not chatter, and the motion on the surface is ``x' = -2 x``.
 """
 
 import math
@@ -21,7 +21,7 @@ for piece in sol.modes["s"]:
     print(f"{piece.mode:8s} from t = {piece.t0:.12f}")
 
 # %%
-# On the surface the state decays as exp(-2 t), exactly.
+# On the surface the state decays exactly as exp(-2 t).
 
 began = sol.modes["s"][-1].t0
 print("x(4) =", sol(4.0)[0], "expected", sol(began)[0] * math.exp(-2 * (4 - began)))

@@ -2,8 +2,8 @@
 A ball whose bounces accumulate
 ===============================
 
-A ball dropped from 1 m bounces with a restitution of 0.7. Its impacts accumulate at ``sqrt(2 h/g)
-(1 + e)/(1 - e)``; behind that instant the contact is closed, and the run goes on.
+A ball dropped from 1 m bounces with a restitution of 0.7. Infinitely many impacts happen before
+``sqrt(2 h/g) (1 + e)/(1 - e)``. After this time the contact is closed, and the run continues.
 """
 
 import math

@@ -2,8 +2,8 @@
 Which integrator is right, and what does it cost?
 =================================================
 
-One chart for one's own model: error against time of the run, held against a reference that is
-tighter than all of them. Hollow markers have a wrong sequence of modes.
+The chart shows the error of each integrator over the time of its run. You can draw it for your own model. The reference
+has a tighter tolerance than all these runs. A hollow marker means a wrong mode sequence.
 """
 
 import hybridsim as hs

@@ -2,8 +2,8 @@
 How little model is enough?
 ===========================
 
-:func:`hybridsim.advise` holds simpler models against the full one and names the simplest that
-answers a question within a tolerance, here the amplitude of a forced oscillator within 1 %.
+:func:`hybridsim.advise` compares simpler models with the full model. It names the simplest model that answers a
+question within a tolerance. In this example the question is the amplitude of a forced oscillator within 1 %.
 """
 
 import hybridsim as hs
@@ -14,7 +14,7 @@ print(advice.table())
 plot.save(plot.advice(advice), "advice.png")
 
 # %%
-# How the amplitude and the time in stick depend on the frequency, for three loads on the contact:
+# This picture shows the amplitude and the time in stick over the frequency, for three normal loads.
 
 response = hs.frequency_response("dfcs", [100.0 + 20 * i for i in range(61)], {"N": [20, 40, 60]})
 plot.save(response.plot(over="omega"), "response.png")

@@ -167,7 +167,7 @@ script `python docs/studies/brake.py` finds the onset in three ways:
   enough. At the onset lambda = i sqrt(2).
 - **Linearization.** `hs.linearize` in the mode `slip-` gives the coefficient at which its `growth` is zero.
 - **Simulation.** The run starts {SHAKE:g} away from steady sliding, and lasts {WATCHED:g} units of time without an
-  event. A matrix is fitted to the run that maps the states at t to the states at t + {STEP:g} (dynamic mode
+  event. A matrix maps the states at t to the states at t + {STEP:g}. It is fitted to the run (dynamic mode
   decomposition, Schmid 2010, [doi:10.1017/S0022112010001217](https://doi.org/10.1017/S0022112010001217)). The largest
   eigenvalue of the matrix gives the growth. This method uses no derivatives of the model.
 

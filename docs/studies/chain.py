@@ -154,8 +154,8 @@ After an event hybridsim restarts only the few neighbouring blocks whose series 
 tolerance. At the end of a step it expands the series of all blocks, once for all events of the step. The other
 methods restart all blocks at each event. For these methods the cost of an event is therefore proportional to n.
 {verdict} The series methods control their error. RK4 with h = {STEP:g} has no error control. When RK4 releases a
-block, it changes the speed of the block by 1e-14, so that the block does not stop again at once. siconos was not run,
-because PyPI has no wheel of it (`pip download siconos` finds no version).
+block, it changes the speed of the block by 1e-14, so that the block does not stop again at once. The program siconos
+was not run. PyPI has no wheel of siconos (`pip download siconos` finds no version).
 """
 
 

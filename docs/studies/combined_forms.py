@@ -144,35 +144,37 @@ HEAD = """# Combined forms
 Do runs of models that combine many forms agree with an independent judge? Of {runs} runs {agree} agree and {differ}
 differ. The tables below list the others.
 
-`python docs/studies/combined_forms.py` draws whole models at random. It compares each run with a judge that shares no
-code with hybridsim. The models combine these forms:
+`python docs/studies/combined_forms.py` draws whole models at random. It compares each run with an independent solver,
+the judge, that shares no code with hybridsim. The models combine these forms:
 
 - Every number is a literal, a parameter, an expression of parameters, a definition, a discrete state or an input.
-- Guards, loads, gaps, laws, rates, monitors and resets contain `max`, `min`, `abs` and conditionals. Each of them is
-  written in one of several equal ways.
+- Guards, loads, gaps, laws, rates, monitors and resets contain `max`, `min`, `abs` and conditionals. Each of these
+  functions is written in one of several equivalent ways.
 - Forces, loads and belts change at known times. The changes are single conditions, Boolean combinations, tables and
   waves.
 - Runs start on guards, at rest and on corners. Schedules, clocks, impacts, contacts, relays and monitors meet at one
   instant.
-- Parts depend on states of other parts. Parts of expressions may be definitions.
-- Names, the order of declaration, the scale and sign of the states and the origin of time are also random. One run in
+- Parts of a model depend on states of other parts. A definition may replace a part of an expression.
+- Names, the order of declaration, the scale and sign of states, and the origin of time are also random. One run in
   ten is stopped in the middle and resumed.
 
-Each set of numbers is run by one integrator of hybridsim, or by the default, and by another one at random. The first
-structures are chosen so that rare pairs of forms occur. Each of them is selected from {pool} random structures. It has
-the most pairs that are in fewer than {enough} structures so far. The other structures are not selected. No two forms
-exclude each other, because every form belongs to a part, and parts are drawn independently.
+Each model with a set of numbers runs by one integrator of hybridsim, or by the default, and by another random
+integrator. The first structures are selected so that rare pairs of forms occur. Each of these structures is the best
+of {pool} random structures. It has the most pairs that are in fewer than {enough} structures so far. The other
+structures are not selected. All pairs of forms are possible, because every form belongs to a part of a model, and
+parts are drawn independently.
 
 *The judge* (`tests/reference/combined`) reads an abstract form of the model, and not the model file. It computes the
 motion by Taylor series in each configuration. It finds zeros by dense sampling and bisection. At an instant it tries
-every combination of modes and sides, and keeps those whose conditions hold just after the instant. Impulses are
-found by enumeration too. A disagreement is judged again in 40 digits. A run is compared only as long as the motion
-is certain. The comparison ends at a touch of zero within 1e-6, and at an instant that the rules leave open.
+every combination of modes and sides. Those combinations are admissible whose conditions are true just after the
+instant. The judge finds impulses by enumeration too. If a run disagrees, the judge computes the motion again in 40
+digits. A run is compared only as long as the motion is certain. The comparison ends if a guard approaches zero within
+1e-6 and turns back. It also ends at an instant at which the rules permit several motions.
 
-A run *agrees* under two conditions. At {points} times all states and discrete states differ by at most {allowed:g}
-of the size of the motion, and the monitors fire as often as they should. Two kinds of runs are counted separately.
-One kind stops with a named status before the motion of the judge ends. The other kind is wrong, but warns that a
-jump inside a mode was integrated without location.
+A run *agrees* under two conditions. At each of {points} times all states and discrete states differ from those of the
+judge by at most {allowed:g} of the size of the motion. All monitors fire as often as with the judge. Two kinds of
+runs are counted separately. The first kind stops with a named status before the motion of the judge ends. The second
+kind is wrong, but has a warning that a jump inside a mode was integrated without location.
 
 """
 
@@ -195,8 +197,9 @@ def page(done: list[dict[str, Any]], draws: int) -> str:
         differ=kinds["differs"],
     )
     instants = sum(r.get("instants", 0) for r in runs)
-    out += f"{len(seeds)} structures with {draws} sets of numbers each give {len(runs)} runs with "
-    out += f"{instants} instants.\n\n"
+    out += f"There are {len(seeds)} structures with {draws} sets of numbers each, and each set runs by two "
+    out += "integrators. Without runs that have no model or no certain motion, these are "
+    out += f"{len(runs)} runs, with {instants} instants of events.\n\n"
     out += "| result | runs |\n| --- | --- |\n"
     out += "".join(f"| {kind} | {count} |\n" for kind, count in kinds.most_common())
     statuses = Counter((r["kind"], r["status"]) for r in runs if r["kind"] in ("refused", "stopped", "chose"))
@@ -208,7 +211,7 @@ def page(done: list[dict[str, Any]], draws: int) -> str:
         out += f"| `{name}` | {sum(of.values())} | {of['differs']} | {of['stopped'] + of['refused']} |\n"
     single, double = pairs(seeds)
     least = sorted((double[pair], *pair) for pair in combinations(sorted(single), 2))
-    out += f"\n## Forms\n\nThere are {len(single)} forms and {len(least)} pairs of them. "
+    out += f"\n## Forms\n\nThere are {len(single)} forms and {len(least)} pairs of forms. "
     out += f"{sum(count < 10 for count, *_ in least)} pairs occur in fewer than 10 structures.\n\n"
     out += "| form | structures | rarest partner | structures |\n| --- | --- | --- | --- |\n"
     for name in sorted(single):

@@ -96,8 +96,8 @@ Each file is a model of the package or a scene of the atlas with one to a few ch
 - An expression is code, too deep, too long or without a value.
 - The text has letters of other scripts, control characters or bytes that are not text.
 
-Each accepted file is checked for warnings. It then runs for up to a second of its own time, with a random integrator
-and limits of 2 seconds, 5000 steps and 500 megabytes.
+Each accepted file is checked for warnings. It then runs with a random integrator, for up to a second of its own time.
+The limits are 2 seconds, 5000 steps and 500 megabytes.
 
 | ending | files |
 | --- | --- |

@@ -161,9 +161,9 @@ steps, which test the dense output.
 
 The error is the largest error of all states, relative to the largest state of the run, in units of rtol. The
 tolerance is {asked}. `exact` has no tolerance. The unit of its error is a sum of two parts. The first part is 2^-53
-of the largest state. The second part is the change of the motion if all numbers of the model change by a relative
-2^-53 (the worst of three random changes). No floating-point computation can avoid an error of this size. The change
-of basis in `exact` may multiply it by a hundred.
+of the largest state. For the second part, all numbers of the model change by a relative 2^-53. The part is the
+largest change of the motion in three trials. No floating-point computation can avoid an error of this size. The
+change of basis in `exact` may multiply it by a hundred.
 
 A run is *within* the tolerance if its error is at most {within:.0f} units. For `exact` the limit is {exact:.0e}
 units, which is 1e-12. A method controls the error of each step. The effect of these errors at the end depends on the

@@ -223,9 +223,8 @@ and computes at most {most} point per kill again. `docs/studies/survival.py` int
 
 Each run was stopped at {moments} random steps by `limits={{"steps": ...}}` and continued by `resume()`. The table
 counts the runs that stopped. Compiled code checks limits only from time to time, and a run that reached its end
-before such a check is *done*. Resumed runs are compared bit for bit with a run that was never stopped. The compared
-results are the times and states of all steps, all events with the states before and after them, the status and the
-message.
+before such a check is *done*. Resumed runs are compared bit for bit with a run that was never stopped. The comparison
+includes the times and states of all steps, the events with the states before and after, the status and the message.
 
 | integrator | {scenes} |
 | --- | {lines} |

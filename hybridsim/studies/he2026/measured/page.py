@@ -24,22 +24,27 @@ _PICTURES = {
     "text": "step-study",
 }
 _CAPTIONS = {
-    "figure 3": "Two periods by every reading and by the exact motion, and below the harmonics of x over the first.",
-    "figure 4": "Each line is a case. Solid lines vary r, dashed N, dotted F0. Black is a point "
-    "on the ridge of Figure 10.",
-    "figure 5": "The same over eps_v. The grey line is the published setting.",
-    "figure 6": "Left is the run time. Right is the number of evaluations, which no other program disturbs.",
-    "figure 7": "The grey mark is +225 %.",
-    "figure 10": "The columns have the published A2 with the velocity of a sticking body kept, "
-    "set to zero, and the exact A2.",
-    "figure 11": "The same for the energy.",
-    "figure 12": "Without stick the force jumps between its limits. With v kept the body creeps while it sticks.",
-    "figure 13": "Nothing sticks here, so that all columns are equal.",
-    "text": "The deviation is of first order in the step. It vanishes in the limit, since "
-    "the limit is the motion with stick.",
+    "figure 3": "The upper panels show two periods of each reading and of the exact motion. The lower panels show"
+    " the harmonics of x relative to the first harmonic.",
+    "figure 4": "Each line is a case. Solid lines are for different r, dashed lines for different N, and dotted "
+    "lines for different F0. The black line is for a point on the ridge of Figure 10.",
+    "figure 5": "The curves are the results of these cases over eps_v. The grey line is the published setting.",
+    "figure 6": "The left panel shows the run time. The right panel shows the number of evaluations, on which "
+    "other programs have no effect.",
+    "figure 7": "The grey mark is at +225 %.",
+    "figure 10": "The first two columns are for the published A2, with the velocity in stick kept and set to "
+    "zero. The last column is for the exact A2.",
+    "figure 11": "These are the maps of Figure 10 for the energy.",
+    "figure 12": "Without stick the force jumps between its limits. With v kept the body creeps in stick.",
+    "figure 13": "The body does not stick in this case, so that all columns are equal.",
+    "text": "The deviation is of first order in the step. It tends to zero with the step, because the motion "
+    "tends to the motion with stick.",
 }
 _WIDTH = 120
-_PAIR = "Each pair names the method without stick, and then the reading of the method with stick."
+_PAIR = (
+    "In each pair of methods, the first is the method without stick, and the second is the reading of the method with "
+    "stick."
+)
 
 
 def page(study: Study, image: Callable[[str], str]) -> str:
@@ -72,29 +77,30 @@ def _head(study: Study, claims: tuple[Claim, ...]) -> str:
 # He et al. 2026, claim by claim
 
 When must a model include stick-slip? The published map does not answer this question, because it shows the size of
-the step ({SOURCE}). The equation without stick has the motion with stick as its limit, so that the values of the map
-decrease with the step. The motion, the spectrum and the reduction to (r, F0/N) in the paper are right. Its run times
-are those of one implementation.
+the step ({SOURCE}). For small steps, the motion of the equation without stick approaches the motion with stick. The
+values of the map therefore decrease with the step. The motion, the spectrum and the reduction to (r, F0/N) in the
+paper are right. The run times in the paper are those of one implementation.
 
 This study computes every figure again with our implementation of the published method (`rk4-dichotomy`, and
-`rk4-sign` for "stick-slip not considered"). It uses every reading that the paper leaves open, and compares them with
-the exact motion (`exact`). Results that hold for any step are after the claims. They show which motions stop, for
-how long, and how large the errors of models without stops really are.
+`rk4-sign` for "stick-slip not considered"). The paper leaves details of the method open. The study runs the method
+with each choice of these details, called a reading, and compares the results with the exact motion (`exact`). The
+sections after the claims have results that depend on no step. They show which motions stop, for how long, and how
+large the errors of models without stops are.
 
 | figure | claim | verdict |
 | --- | --- | --- |
 {rows}
 
-**Terms.** r is omega/omega_n. A is half the range of x in a period, and E is the integral of x**2 over it. A0 and E0
-are without friction. A1 and E1 are with "stick-slip not considered" (`rk4-sign`), and A2 and E2 with stick-slip
-considered. A_D is
+**Terms.** r is omega/omega_n. A is half the range of x in a period, and E is the integral of x**2 over a period. A0
+and E0 are for the motion without friction. A1 and E1 are for "stick-slip not considered" (`rk4-sign`), and A2 and E2
+for stick-slip considered. A_D is
 |A1 - A2|/A2, and E_D is defined in the same way. The paper leaves these details of the dichotomy open:
 
-- *v kept* or *v zero* is the velocity of a body after it has stopped.
-- *release step* or *located* is the time of the release. It is at the next step, or when the load reaches the limit.
-- *force by step* or *by stage* is the side of friction. It is chosen once per step, or at each stage of RK4. For A1
-  these are *sign by step* and *by stage*.
-- *full-step* or *rest-of-step* is the length of the step after an event.
+- *v kept* or *v zero*: in stick the velocity of the body is kept, or set to zero.
+- *release step* or *located*: the release is at the next step, or when the applied force reaches the limit.
+- *force by step* or *by stage*: the direction of friction is chosen once per step, or at each stage of RK4. For A1
+  these choices are called *sign by step* and *by stage*.
+- *full-step* or *rest-of-step*: the step after an event is a full step, or the rest of the step of the event.
 
 One command makes this page, its pictures and the [verdicts as data](he2026.json):
 `hybridsim study he2026{quick} --out FOLDER`."""
@@ -131,11 +137,10 @@ def _readings(study: Study) -> str:
         [
             "## Details that the paper leaves open",
             "",
-            "The table gives the error of the amplitude in per cent. It is the mean over the last",
-            "periods of a run (least",
-            "to greatest). One of the open details matters. It is the velocity of a sticking body, which",
-            "Eq. 4 keeps at its",
-            "value after the dichotomy. If the motion does not repeat, the amplitude is a range.",
+            "The table gives the error of the amplitude in per cent. It is the mean over the last periods of a run",
+            "(least to greatest). Only one of the open details has a large effect. This detail is the velocity in",
+            "stick, which Eq. 4 keeps at its value after the dichotomy. If the motion does not repeat, the amplitude",
+            "is a range.",
             "",
             "| reading | " + " | ".join(columns) + " |",
             "| --- |" + " --- |" * len(columns),
@@ -156,11 +161,10 @@ def _truth(study: Study, image: Callable[[str], str]) -> str:
             f"The exact steady motion was computed on {points[0]} x {points[1]} points. The residual of periodicity is "
             f"{facts['median residual of periodicity']:.0e} (median), and at most "
             f"{facts['largest residual of periodicity']:.0e}. Den Hartog's boundary is a closed form that separates",
-            f"the points with stops from those without. {disagree} points are on the wrong side. If there",
-            "are no stops,",
-            "the closed form of the amplitude agrees with the run to",
-            f"{facts['largest deviation of the closed form where it holds']:.0e}. There are up to",
-            f"{facts['most stops per period']} stops per period at low frequency.",
+            f"points with stops from points without stops. {disagree} points are on the wrong side. If there are no",
+            "stops, the closed form of the amplitude agrees with the run to",
+            f"{facts['largest deviation of the closed form where it holds']:.0e}. At low frequencies there are up to",
+            f"{facts['most stops per period']} stops per period.",
             "",
             f"![stick fraction, stops per period, amplitude]({image('stick')})",
             "",
@@ -174,7 +178,7 @@ def _truth(study: Study, image: Callable[[str], str]) -> str:
             "",
             f"![deviation of simpler models]({image('simpler-models')})",
             "",
-            "*Grey points do not move, or the model has no answer.*",
+            "*At grey points the body does not move, or the model has no answer.*",
         ]
     )
 
@@ -191,8 +195,9 @@ def _required_settings(study: Study, picture: str) -> str:
         [
             "## Settings for an error of 1 %",
             "",
-            "The runs start on the exact orbit. A setting is enough if each of the last forty periods is within 1 % of",
-            f"the exact amplitude. h0 is up to {STEPS[-1]}, and eps_v down to {EPS[-1]:.1e} m/s.",
+            "The runs start on the exact orbit. A setting is sufficient if the amplitude of each of the last forty",
+            f"periods is within 1 % of the exact amplitude. The steps have h0 up to {STEPS[-1]}. The",
+            f"smallest eps_v is {EPS[-1]:.1e} m/s.",
             "",
             "| method | share of the map with enough at the published setting | share without enough at the finest |",
             "| --- | --- | --- |",
@@ -220,11 +225,10 @@ def _timed_map(study: Study, picture: str) -> str:
             f"{study.timed_map.side} points, from "
             f"{facts['settling']}. All methods use the same",
             "threads in the same run, and the time includes all costs of a point. `exact` runs the whole map as one",
-            "`hs.sweep(..., after=100)`. The others run a random sample of it, point by point, which",
-            "adds a millisecond",
-            "per point. Errors are those of the sample, compared with the motion that has settled to",
-            "rounding. Shooting",
-            "is `hs.steady_state`, which finds the orbit without a long run and also determines its kind.",
+            "`hs.sweep(..., after=100)`. The other methods run a random sample of the points, one by one, which adds a",
+            "millisecond per point. Errors are for this sample. The reference is the motion that has settled to",
+            'rounding. The method "shooting" is `hs.steady_state`, which finds the orbit without a long run and also',
+            "determines its kind.",
             "",
             "| method | ms per point | points | median error of A | largest of A | of E | time, `exact` = 1 |",
             "| --- | --- | --- | --- | --- | --- | --- |",
@@ -241,8 +245,8 @@ def _how(study: Study) -> str:
             "## Size of the study",
             "",
             f"The size is {study.size.name}. Runs have {study.size.periods} periods from rest, and A and E are",
-            f"those of the last {study.size.last} of them. Without stick the motion does not repeat, so that one",
-            f"period is not enough. {_PAIR} The study ran on {study.workers} threads.",
+            f"those of the last {study.size.last} periods. Without stick the motion does not repeat, so that one",
+            f"period is not sufficient. {_PAIR} The study ran on {study.workers} threads.",
             "",
             "| part | seconds |",
             "| --- | --- |",

@@ -139,10 +139,10 @@ def claim(found: Reduction) -> Claim:
     literal, stribeck = ours[paper.LITERAL.name], float(found.spread(STRIBECK).max())
     why = (
         f"With `exact` A, E and the stick fraction depend only on (r, F0/N), to {max(found.rounding.values()):.0e} "
-        f"over {_SAMPLES} points and three loads. Without stick the same is true, except for chatter. The reduction "
-        f"fails if a velocity is given in m/s. With eps_v = 8e-4 and v kept, A/A0 varies by "
+        f"over {_SAMPLES} points and three loads. Without stick A and E also depend only on (r, F0/N), except for "
+        f"chatter. The reduction fails if a velocity is given in m/s. With eps_v = 8e-4 and v kept, A/A0 varies by "
         f"{100 * literal['spread of A/A0']:.2g} % over F0 = {FORCES[0]:g} to {FORCES[-1]:g} N. With a Stribeck "
-        f"velocity it varies by {100 * stribeck:.2g} %."
+        f"velocity A/A0 varies by {100 * stribeck:.2g} %."
     )
     return Claim(
         "figures 8, 9",

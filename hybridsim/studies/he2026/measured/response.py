@@ -108,9 +108,9 @@ def claim_figure_3(runs: dict[str, Response]) -> Claim:
     verdict = Verdict.REPRODUCED if exact["holds"] and keeps else Verdict.NOT
     third, fifth = exact["third"], exact["fifth"]
     why = (
-        f"The exact motion has the period of the forcing. Its even harmonics are below {exact['even']:.0e}. Its "
-        f"third and fifth harmonics are {100 * third:.1f} % and {100 * fifth:.1f} % of the first. "
-        f"{len(keeps)} of the {len(ours)} readings of the method show the same to 0.1 %."
+        f"The exact motion has the period of the forcing. The even harmonics of x are below {exact['even']:.0e}. "
+        f"The third and fifth harmonics are {100 * third:.1f} % and {100 * fifth:.1f} % of the first. {len(keeps)}"
+        f" of the {len(ours)} readings of the method have these harmonics to 0.1 %."
     )
     return Claim(
         "figure 3",
@@ -181,8 +181,8 @@ def claim_figure_13(runs: dict[str, Response], figure_12: dict[str, Response]) -
     verdict = Verdict.REPRODUCED if near and less else Verdict.SHAPE if less else Verdict.NOT
     why = (
         f"The deviation is smaller than in Figure 12, as claimed, but no reading gives more than "
-        f"{100 * greatest:.2g} %. The exact motion sticks for {100 * runs[EXACT].stick:.2g} % of the period here, "
-        f"so that a method without stick has no error."
+        f"{100 * greatest:.2g} %. In this case the exact motion sticks for {100 * runs[EXACT].stick:.2g} % of the "
+        f"period, so that a method without stick has no error."
     )
     return Claim(
         "figure 13",

@@ -120,8 +120,8 @@ def claim_figure_6(times: RunTimes) -> Claim:
     verdict = Verdict.REPRODUCED if mean >= 1.0 else Verdict.SHAPE if mean >= 0.3 else Verdict.NOT
     why = (
         f"From 8e-4 to 1e-7 the run time changes by {100 * mean:+.0f} % (mean of {len(CASES)} cases). A smaller "
-        f"interval needs a few more halvings at each of the two reversals per period. These are at most "
-        f"{100 * most:.1f} % more evaluations of the right-hand side."
+        f"interval needs a few more halvings at each of the two reversals per period. The number of evaluations of "
+        f"the right-hand side increases by at most {100 * most:.1f} %."
     )
     times_exact = fmean(c.seconds for c in times.by_method["exact"].values())
     return Claim(
@@ -165,9 +165,10 @@ def claim_figure_7(times: RunTimes) -> Claim:
     low = min(row["t_D, mean"] for row in ours.values())
     why = (
         f"Stick changes the run time by {100 * low:+.0f} % to {100 * best['t_D, mean']:+.0f} % (means of "
-        f"{len(CASES)} cases). It needs {best['right-hand sides, with over without']:.3f} times the evaluations of "
-        f"the right-hand side. The claimed increase is therefore the cost of one implementation. `exact`, with "
-        f"stick, takes {100 * (1 + fmean(against)):.1f} % of the time of the method without stick."
+        f"{len(CASES)} cases). The number of evaluations of the right-hand side is "
+        f"{best['right-hand sides, with over without']:.3f} times as large. The claimed increase is "
+        f"therefore the cost of one implementation. `exact` includes stick and takes "
+        f"{100 * (1 + fmean(against)):.1f} % of the time of the method without stick."
     )
     return Claim(
         "figure 7",

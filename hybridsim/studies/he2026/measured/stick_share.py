@@ -37,11 +37,11 @@ def claim(maps: Maps, study: StepStudy, truth: Truth) -> Claim:
     stage = study.along(SIGNS[-1].name, "A")
     one, five = truth.harmless(0.01), truth.harmless(0.05)
     why = (
-        f"A_D grows with the stick fraction (rank correlation {ours[closest][key]:.2f}), but the step has the same "
-        f"influence. At the same stick fractions A_D decreases from {100 * stage[first]:.2g} % to "
-        f"{100 * stage[-1]:.2g} % with the step. The error of the closed form without stops depends only on the "
-        f"stick fraction. It is below 1 % for stick fractions below {100 * one:.2g} %, and below 5 % for those "
-        f"below {100 * five:.2g} %."
+        f"A_D grows with the stick fraction (rank correlation {ours[closest][key]:.2f}), but the step has an equal "
+        f"influence. If the step decreases at unchanged stick fractions, A_D decreases from "
+        f"{100 * stage[first]:.2g} % to {100 * stage[-1]:.2g} %. The error of the closed form without stops depends "
+        f"only on the stick fraction. It is below 1 % for stick fractions below {100 * one:.2g} %, and below "
+        f"5 % for those below {100 * five:.2g} %."
     )
     return Claim(
         "text",
