@@ -80,11 +80,11 @@ is "undecided at rounding", and the mode does not change.
 
 ## Verdicts
 
-The recurrences of the engine give the series and the bounds. Integers of {bits} bits give the true series. The
-expressions (one structure for 500 draws) and the state are random. A constant is added to the guard. Its value at the
-state is then zero to the last bit, or differs from zero by 1e-19 to 1. In three of ten restarts the rate of the guard
-is changed in this way too. The oscillator is described under "Whole runs". Its parameters vary over decades, and its
-time over up to 10^6 periods. Its applied force is at the limit of friction or very near to it.
+The recurrences of the engine give the series and the bounds. The true series are computed with integers of {bits}
+bits. The expressions (one structure for 500 draws) and the state are random. A constant is added to the guard. Its
+value at the state is then zero to the last bit, or differs from zero by 1e-19 to 1. In three of ten restarts the rate
+of the guard is changed in this way too. The oscillator is described under "Whole runs". Its parameters vary over
+decades, and its time over up to 10^6 periods. Its applied force is at the limit of friction or very near to it.
 
 | restart | judged | clear | spurious | missed | inside, decided | undecided | against the rule | error/bound |
 | --- | --- | --- | --- | --- | --- | --- | --- | --- |

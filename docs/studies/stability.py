@@ -232,7 +232,7 @@ equal parts of a step. All other results of this page are from one run each.
 With the velocity set to zero, the published setting is right in every case. Its zone is at most 4 % of the largest
 speed, and 11 % would also be right. With the velocity kept, as in Eq. 4 of the paper, the setting is right for a body
 that never sticks. It is also right for r = 0.6 with F0/N = 0.75 and above. It is wrong in every other case. The error
-grows towards the threshold. The published map of deviations has its ridge there. As v0 of tanh the zone is wrong in
+grows towards the threshold. The published map of deviations has its ridge there. As v0 of tanh, 8e-4 m/s is wrong in
 half of the cases. The dichotomy needs only a fifth of the 1200 steps. More steps do not help if the zone is too wide.
 `rk4-sign` may need ten times as many steps.
 

@@ -47,10 +47,10 @@ tolerance applies to methods with error control. For `rk4-dichotomy`, which bise
 1e-5. Other fixed-step methods place events at the ends of steps. Their tolerance is at least 4.2e-4, the length of two
 steps of unit/4800. In scenes longer than fifty units, `scipy-rk23` runs with rtol 100 times as large.
 
-In the tables of the scenes, a number follows the name of a method. It is the larger of two errors at the last setting.
-One is the error of event times in units. The other is the error of states relative to their largest true value. If the
-error decreases with the step, the table also has the observed order of convergence. Integrators also run scenes beyond
-their stated limits. They then fail for the stated reason.
+In the tables of the scenes, a number follows the name of a method. This number is the larger of two errors at the last
+setting. One is the error of event times in units. The other is the error of states relative to their largest true
+value. If the error decreases with the step, the table also has the observed order of convergence. Integrators also run
+scenes beyond their stated limits. They then fail for the stated reason.
 
 Most methods use the event location and the mode selection of the engine. The exceptions are the fixed-step methods, and
 methods with native events, a cooldown or regularized friction. If all methods are right in a scene, its text describes

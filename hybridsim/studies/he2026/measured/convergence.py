@@ -118,7 +118,7 @@ def claim_figure_4(curves: Curves) -> Claim:
     return Claim(
         "figure 4",
         "4",
-        "A and E have converged (0.1 %) at about T/1200, with eps_v = 1e-6, and also without stick-slip",
+        "A and E have converged (0.1 %) at a step of about T/1200, both with eps_v = 1e-6 and without stick-slip",
         {"h0": paper.STEPS_PER_PERIOD, "criterion": LIMIT},
         ours,
         closest,

@@ -172,9 +172,10 @@ def claim(found: Maps, quantity: str, study: StepStudy) -> Claim:
         f"compared with the exact motion. In the paper it decreases there."
     )
     text = (
-        f"{quantity}_D is at least 10 % for F0/N {_range_text(box10['F0/N'])}, r {_range_text(box10['r'])}, and at "
-        f"least 5 % for {_range_text(box5['F0/N'])}, {_range_text(box5['r'])}, with a maximum of "
-        f"{100 * published['maximum']:.2f} % at F0/N = {where[0]}, r = {where[1]}"
+        f"{quantity}_D is at least 10 % for F0/N from {_range_text(box10['F0/N'])} and r from "
+        f"{_range_text(box10['r'])}. It is at least 5 % for F0/N from {_range_text(box5['F0/N'])} and r from "
+        f"{_range_text(box5['r'])}. The maximum is {100 * published['maximum']:.2f} % at F0/N = {where[0]}, "
+        f"r = {where[1]}"
     )
     exact_rows = {name: row for name, row in readings.items() if name.endswith(EXACT)}
     return Claim(

@@ -147,8 +147,8 @@ def claim(found: Reduction) -> Claim:
     return Claim(
         "figures 8, 9",
         "8, 9",
-        "A/A0 and E/E0 are constant at fixed F0/N as F0 varies, with and without stick, so that "
-        "(r, N, F0) reduces to (r, F0/N)",
+        "at fixed F0/N, A/A0 and E/E0 do not depend on F0, with and without stick. The "
+        "parameters (r, N, F0) therefore reduce to (r, F0/N)",
         {"spread": "constant"},
         ours,
         closest,

@@ -115,7 +115,7 @@ def claim_figure_3(runs: dict[str, Response]) -> Claim:
     return Claim(
         "figure 3",
         "3",
-        "the motion has the period of the forcing and only odd harmonics of w, and high harmonics are significant",
+        "the motion has the period of the forcing and only odd harmonics of w. High harmonics are significant",
         {"period": "T", "harmonics": "odd", "high harmonics": "significant"},
         ours,
         min(ours, key=lambda name: ours[name]["even"] + ours[name]["between"]),
@@ -159,8 +159,7 @@ def claim_figure_12(runs: dict[str, Response], study: StepStudy) -> Claim:
     return Claim(
         "figure 12",
         "12",
-        "A_D is 15 % at F0/N = 0.54, r = 0.55, and without stick the friction force "
-        "jumps between its limits around v = 0",
+        "A_D is 15 % at F0/N = 0.54, r = 0.55. Without stick the friction force jumps between its limits around v = 0",
         {"A_D": 0.15},
         ours,
         closest,
@@ -187,7 +186,7 @@ def claim_figure_13(runs: dict[str, Response], figure_12: dict[str, Response]) -
     return Claim(
         "figure 13",
         "13",
-        "A_D is 2 % at F0/N = 0.80, r = 1.0, and less stick causes less deviation",
+        "A_D is 2 % at F0/N = 0.80, r = 1.0. Less stick causes less deviation",
         {"A_D": 0.02},
         ours,
         closest,

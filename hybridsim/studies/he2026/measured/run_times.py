@@ -127,7 +127,7 @@ def claim_figure_6(times: RunTimes) -> Claim:
     return Claim(
         "figure 6",
         "6",
-        "the run time grows fast as eps_v decreases, by more than 120 % at 1e-7, and hardly depends on r, N, F0",
+        "the run time grows fast if eps_v decreases, by more than 120 % at 1e-7. It hardly depends on r, N and F0",
         {"t_d at 1e-7": 1.20},
         ours,
         closest,

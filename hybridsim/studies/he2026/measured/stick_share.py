@@ -46,8 +46,8 @@ def claim(maps: Maps, study: StepStudy, truth: Truth) -> Claim:
     return Claim(
         "text",
         "",
-        "the stick fraction of the period determines the deviation, and if it is small, stick-slip need not be "
-        "considered",
+        "the stick fraction of the period determines the deviation. If this fraction is small, stick-slip "
+        "need not be considered",
         {"deviation": "grows with the share of the period in stick"},
         ours,
         closest,
