@@ -379,6 +379,14 @@ CALLS: dict[str, tuple[Callable[[], Callable[..., Any]], Callable[[], dict[str, 
     "Fit.solution": (lambda: fitted().solution, dict),
     "Advice.to_json": (lambda: advised().to_json, dict),
     "Sensitivities.at": (lambda: hs.sensitivities(sliding(), ["mu"]).at, lambda: {"t": 0.01}),
+    "Sensitivities.of": (
+        lambda: (
+            lambda reading, quantities, t_span: hs.sensitivities(sliding(), ["mu"]).of(
+                reading, quantities, t_span=t_span
+            )
+        ),
+        lambda: {"reading": "maximum", "quantities": "x", "t_span": (0, 0.01)},
+    ),
     "Sensitivities.plot": (lambda: hs.sensitivities(sliding(), ["mu"]).plot, dict),
     "Branch.plot": (lambda: branch().plot, lambda: {"name": "x"}),
     "Branch.amplitude": (lambda: branch().amplitude, lambda: {"name": "x"}),

@@ -68,6 +68,10 @@ class Energies(EventsAndModes):
             ]
             return np.prod(factors, axis=0)[:, None]
 
+        return float(self._integrated(product, *self._part(t_span), 1)[0])
+
+    def _part(self, t_span: Any) -> tuple[float, float]:
+        """Return the first and last time of a part of the run, which is all of it for None."""
         whole = (self.t_start, self.t_end)
         first, last = whole if t_span is None else two_numbers(t_span, "t_span", "use two times, (a, b)")
         low, high = sorted(whole)
@@ -76,7 +80,7 @@ class Energies(EventsAndModes):
                 f"`t_span` = ({first!r}, {last!r}) is outside the run",
                 remedy=f"use times from t = {low!r} to {high!r}",
             )
-        return float(self._integrated(product, first, last, 1)[0])
+        return first, last
 
     @cached_property
     def dissipated(self) -> dict[str, float]:

@@ -16,7 +16,9 @@ _BLOCK = 400_000  # values of the integrand that are computed at once
 Integrand = Callable[[np.ndarray], np.ndarray]
 
 
-def integral(integrand: Integrand, edges: np.ndarray, width: int) -> np.ndarray:
+def integral(
+    integrand: Integrand, edges: np.ndarray, width: int, least: np.ndarray | float = 0.0
+) -> np.ndarray:
     """Return the integrals (width,) of a function from times (k,) to values (k, width), from edges[0] to edges[-1].
 
     ::
@@ -24,11 +26,11 @@ def integral(integrand: Integrand, edges: np.ndarray, width: int) -> np.ndarray:
         integral of f over [a, b] = (b - a)/2 * sum of w_i f((a + b)/2 + (b - a)/2 x_i),   i = 1 ... 8
 
     The function should be smooth between neighbouring edges. An interval is halved until the rule on it and on its
-    halves agree within 1e-12 of the integral of |f|; the value on the halves is taken.
+    halves agree within 1e-12 of the integral of |f|, or within `least`; the value on the halves is taken.
     """
     low, high = edges[:-1], edges[1:]
     whole, sizes = _rule(integrand, low, high, width)
-    allowed, total = _TOLERANCE * sizes.sum(axis=0), np.zeros(width)
+    allowed, total = np.maximum(_TOLERANCE * sizes.sum(axis=0), least), np.zeros(width)
     for _ in range(_ROUNDS):
         middle = 0.5 * (low + high)
         left, right = (_rule(integrand, a, b, width)[0] for a, b in ((low, middle), (middle, high)))

@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hybridsim.analysis.steady.orbit import Orbit
-from hybridsim.analysis.steady.resolving import orbit_of
+from hybridsim.analysis.polynomials.orbit import Orbit
+from hybridsim.analysis.polynomials.resolving import orbit_of
 from hybridsim.arguments import cannot_be, known_name
 from hybridsim.errors import UsageError, nearest
 from hybridsim.expr import evaluate

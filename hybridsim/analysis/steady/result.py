@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from hybridsim.analysis.polynomials.orbit import Orbit as PeriodOrbit
+from hybridsim.analysis.polynomials.resolving import orbit_of
 from hybridsim.analysis.steady.measures import Measures
 from hybridsim.analysis.steady.motion import Motion
-from hybridsim.analysis.steady.orbit import Orbit as PeriodOrbit
 from hybridsim.analysis.steady.period_readings import Summarised, summed
-from hybridsim.analysis.steady.resolving import orbit_of
 from hybridsim.analysis.steady.shooting import Orbit, multipliers, rates_at_end
 from hybridsim.analysis.variations.sensitivities import derivatives
 from hybridsim.arguments import whole_number

@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from hybridsim.analysis.polynomials.orbit import Orbit
+from hybridsim.analysis.polynomials.resolving import orbit_of
 from hybridsim.analysis.steady.motion import Motion, Point, point_at, point_at_end
-from hybridsim.analysis.steady.orbit import Orbit
 from hybridsim.analysis.steady.quiet import (
     between_events,
     event_times,
@@ -17,7 +18,6 @@ from hybridsim.analysis.steady.quiet import (
     middle_of_longest,
     quiet_offset,
 )
-from hybridsim.analysis.steady.resolving import orbit_of
 from hybridsim.analysis.steady.scales import rounding_of
 from hybridsim.analysis.variations.off_zero import rates_of
 from hybridsim.analysis.variations.sizes import ranges
@@ -173,7 +173,7 @@ def free_passings(
     np.maximum(largest, scale[:n], out=largest)
     middle = between_events(event_times(solution), 0.5 * duration, 0.25 * duration, 0.75 * duration)
     late = motion.run(point_at(solution, middle), duration - middle)
-    orbit = orbit_of(late, states_only=True)
+    orbit = orbit_of(late, late.names)
     low, high = orbit.extremes
     moves = np.where(scale[:n] > 0.0, (high - low) / np.where(scale[:n] > 0.0, scale[:n], 1.0), 0.0)
     end = point_at_end(late)

@@ -34,6 +34,15 @@ class OneSide:
         """
         return self._carrier.between(self._carried, self._directions, number, stops)
 
+    def shift(self, number: int) -> np.ndarray:
+        """Return the derivatives (M,) of the time at which a segment starts; zero behind the last one."""
+        return _shift(self._carried, number)
+
+    def own_sizes(self) -> np.ndarray:
+        """Return the length (M,) along each direction at which some quantity has changed by its own size."""
+        found: np.ndarray = self._carrier.own_sizes(self._directions)
+        return found
+
     def differing(self) -> list[tuple[str, np.ndarray]]:
         """Return names of functions at zero, each with the mask (M,) of the directions in which the sides differ."""
         return []
@@ -77,11 +86,19 @@ class BothSides(OneSide):
             shifts[:, self._chosen] = np.nan
             return at, shifts
         _, sides = _times(self._both, 2 * len(self._chosen))
-        solution = self._carrier.solution
-        least = _ROUNDING * (solution.t_end - solution.t_start) / self._own_sizes()
-        lost = at[:, None] > self._lost(self._both)
-        shifts[:, self._chosen] = self._agreeing(sides, least, lost)
+        shifts[:, self._chosen] = self._agreeing_times(sides, at[:, None] > self._lost(self._both))
         return at, shifts
+
+    def shift(self, number: int) -> np.ndarray:
+        found = super().shift(number).copy()
+        if len(self._chosen) and number < len(self._carrier.solution._segments):
+            t = float(self._carrier.solution._segments[number].start)
+            if self._both is None:
+                found[self._chosen] = np.where(t > self._first, np.nan, found[self._chosen])
+            else:
+                sides = _shift(self._both, number)
+                found[self._chosen] = self._agreeing_times(sides[None], t > self._lost(self._both))[0]
+        return found
 
     def within(self, number: int, stops: np.ndarray, is_after: bool) -> np.ndarray:
         found = super().within(number, stops, is_after)
@@ -115,12 +132,13 @@ class BothSides(OneSide):
         count = len(self._chosen)
         return np.minimum(both.lost[:count], both.lost[count:])
 
-    def _own_sizes(self) -> np.ndarray:
-        own: np.ndarray = self._carrier.own_sizes(self._directions)[self._chosen]
-        return own
-
     def _agreeing_states(self, sides: np.ndarray, lost: np.ndarray) -> np.ndarray:
-        return self._agreeing(sides, _ROUNDING * self._carrier.sizes() / self._own_sizes(), lost)
+        return self._agreeing(sides, _ROUNDING * self._carrier.sizes() / self.own_sizes()[self._chosen], lost)
+
+    def _agreeing_times(self, sides: np.ndarray, lost: np.ndarray) -> np.ndarray:
+        solution = self._carrier.solution
+        least = _ROUNDING * (solution.t_end - solution.t_start) / self.own_sizes()[self._chosen]
+        return self._agreeing(sides, least, lost)
 
     def _agreeing(self, sides: np.ndarray, least: np.ndarray, lost: np.ndarray) -> np.ndarray:
         """Return the derivatives at which forward and backward directions agree, and NaN elsewhere."""
@@ -128,6 +146,11 @@ class BothSides(OneSide):
         one, other = sides[:, :count], -sides[:, count:]
         apart = np.abs(one - other) > _AGREE * (np.abs(one) + np.abs(other)) + least
         return np.where(apart | lost, np.nan, 0.5 * (one + other))
+
+
+def _shift(carried: Carried, number: int) -> np.ndarray:
+    moved = carried.shifts[number] if number < len(carried.shifts) else np.zeros_like(carried.shifts[0])
+    return moved
 
 
 def _times(carried: Carried, width: int) -> tuple[np.ndarray, np.ndarray]:

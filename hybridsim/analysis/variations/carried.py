@@ -86,6 +86,7 @@ class Carrier:
         event_times, last = EventTimes(self._changes), None
         times: list[tuple[float, np.ndarray]] = []
         starts: list[tuple[np.ndarray, np.ndarray]] = []
+        shifts = [np.zeros(G.shape[1])]
         all_segment_events = list(segment_events_of(self.solution))
         if any(not is_recorded(self.system, one) for one in all_segment_events[-1].happened):
             whole = all_segment_events[-1].segment  # at the end, and left the states and modes as they were
@@ -109,12 +110,13 @@ class Carrier:
             if self._is_end(following.segment) and last is None:
                 last = Last(segment, Y, Yd, behind[2], segment_events.happened)
             Y, Yd, shift = behind
+            shifts.append(np.where(self._moves(shift), shift, 0.0))
             if any(one.kind != "corner" for one in segment_events.happened):
                 times.append((float(following.segment.start), shift))
         if last is not None:
             Y, Yd = self._at_end(last, all_segment_events[-1].segment, Y, Yd)
             starts[-1] = Y, Yd
-        return Carried(Y, Yd, times, self._off, self._lost, starts)
+        return Carried(Y, Yd, times, self._off, self._lost, starts, shifts)
 
     def between(self, carried: Carried, directions: Directions, number: int, stops: np.ndarray) -> np.ndarray:
         """Return the derivatives (k, n + d, M) at ascending local times (k,) of one segment."""

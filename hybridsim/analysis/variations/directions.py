@@ -33,7 +33,8 @@ class Carried:
     x (n, M), discrete (d, M); times: each instant with an event, and its derivatives (M,);
     off: functions exactly at zero that some directions move off zero;
     lost: times (M,) from which on directions lead to another run, or infinity;
-    starts: derivatives of states and discrete states at the start of each segment.
+    starts: derivatives of states and discrete states at the start of each segment;
+    shifts: derivatives (M,) of the time at which each segment starts, exactly zero if it does not move.
     """
 
     x: np.ndarray
@@ -42,3 +43,4 @@ class Carried:
     off: list[OffZero]
     lost: np.ndarray
     starts: list[tuple[np.ndarray, np.ndarray]]
+    shifts: list[np.ndarray]

@@ -11,6 +11,7 @@ import numpy as np
 from hybridsim.analysis.variations.both_sides import OneSide
 from hybridsim.analysis.variations.carried import Carrier
 from hybridsim.analysis.variations.directions import Directions
+from hybridsim.analysis.variations.off_zero import rates_of
 from hybridsim.analysis.variations.quantities import QuantityDerivatives
 from hybridsim.arguments import as_times
 from hybridsim.errors import UsageError, nearest
@@ -46,11 +47,11 @@ class OverTime:
 
     def __init__(self, solution: Solution, directions: Directions, sides: type[OneSide]) -> None:
         self._made_of = solution, directions, sides
-        self._solution, self._sides = solution, sides(Carrier(solution), directions)
+        self.solution, self._sides = solution, sides(Carrier(solution), directions)
         self._quantities = QuantityDerivatives(solution, directions)
         self._known = (*solution.names, *solution.quantities)
         self._starts = len(directions.x) + len(directions.discrete)
-        self._width = directions.parameters.shape[1]
+        self.width = directions.parameters.shape[1]
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle the run without its derivatives, which are computed again on loading."""
@@ -58,28 +59,54 @@ class OverTime:
 
     def at(self, t: Any, names: Sequence[str], side: str) -> Derivatives:
         """Return the derivatives of some states or quantities at a time, or at several times."""
-        for name in names:
-            if name not in self._known:
-                raise UsageError(
-                    f"model {self._solution.model.name} has no quantity {name!r}, which is in names",
-                    remedy=nearest(str(name), self._known, kind="quantities"),
-                )
+        self.require(names)
         found = self.along(as_times(t), names, side)
         if np.ndim(t) == 0:
             found = found[0]
         return Derivatives(tuple(names), found[..., : self._starts], found[..., self._starts :])
 
+    def require(self, names: Sequence[str]) -> None:
+        """Raise `UsageError` for a name of no state or quantity."""
+        for name in names:
+            if name not in self._known:
+                raise UsageError(
+                    f"model {self.solution.model.name} has no quantity {name!r}, which is in names",
+                    remedy=nearest(str(name), self._known, kind="quantities"),
+                )
+
     def along(self, times: np.ndarray, names: Sequence[str], side: str) -> np.ndarray:
         """Return the derivatives (k, m, M) of states or quantities in all directions."""
-        times, side = self._solution._within(times, side)
-        index, s = self._solution._of_model.segment_at(times, side)
-        found = np.empty((len(times), len(names), self._width))
+        times, side = self.solution._within(times, side)
+        index, s = self.solution._of_model.segment_at(times, side)
+        found = np.empty((len(times), len(names), self.width))
         for number in np.unique(index).tolist():
             chosen = np.flatnonzero(index == number)
             chosen = chosen[np.argsort(s[chosen], kind="stable")]
             Y = self._sides.within(number, s[chosen], side == "+")
-            found[chosen] = self._quantities.of(names, self._solution._segments[number], s[chosen], Y)
+            found[chosen] = self._quantities.of(names, self.solution._segments[number], s[chosen], Y)
         return found
+
+    def moving(
+        self, name: str, number: int, s: float, is_after: bool, shift: np.ndarray | None
+    ) -> np.ndarray:
+        """Return the derivatives (M,) of a quantity at a local time of a segment, which moves by `shift` (M,)."""
+        system, segment = self.solution._system, self.solution._segments[number]
+        stops = np.array([s])
+        Y = self._sides.within(number, stops, is_after)
+        if shift is not None and shift.any():
+            x = segment.dense(stops)[0]
+            Y = Y.copy()
+            Y[0, : system.n] += np.outer(rates_of(system, s, x, segment.p, segment.z), shift)
+        found: np.ndarray = self._quantities.of((name,), segment, stops, Y, shift)[0, 0]
+        return found
+
+    def shift(self, number: int) -> np.ndarray:
+        """Return the derivatives (M,) of the time at which a segment starts; zero behind the last one."""
+        return self._sides.shift(number)
+
+    def own_sizes(self) -> np.ndarray:
+        """Return the length (M,) along each direction at which some quantity has changed by its own size."""
+        return self._sides.own_sizes()
 
     def at_end(self) -> np.ndarray:
         """Return the derivatives (n + d, M) of the states and discrete states at the end of the run."""

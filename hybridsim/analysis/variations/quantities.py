@@ -29,10 +29,18 @@ class QuantityDerivatives:
         self._vector = VectorSlopes(self.system, solution._segments[0].origin)
         self._velocities = list(self._trajectory._velocities)
 
-    def of(self, names: Sequence[str], segment: Segment, s: np.ndarray, Y: np.ndarray) -> np.ndarray:
+    def of(
+        self,
+        names: Sequence[str],
+        segment: Segment,
+        s: np.ndarray,
+        Y: np.ndarray,
+        shift: np.ndarray | None = None,
+    ) -> np.ndarray:
         """Return the derivatives (k, m, M) of m quantities at local times (k,) of a segment.
 
         Y : derivatives (k, n + d, M) of the states and discrete states at these times.
+        shift : derivatives (M,) of these times; by default the times are fixed.
         """
         system, model = self.system, self._trajectory.model
         states = [*system.names, *(d.name for d in model.discrete)]
@@ -47,7 +55,7 @@ class QuantityDerivatives:
                 others["quantities"].append((k, self._place(name, segment.z)))
         for function, columns in others.items():
             if columns:
-                slopes = self._slopes(function, segment, s, Y)
+                slopes = self._slopes(function, segment, s, Y, shift)
                 found[:, [k for k, _ in columns]] = slopes[:, [place for _, place in columns]]
         return found
 
@@ -58,7 +66,9 @@ class QuantityDerivatives:
         special = [f"{name} in {mode}" for mode in modes if f"{name} in {mode}" in known]
         return known.index(special[-1] if special else name)
 
-    def _slopes(self, name: str, segment: Segment, s: np.ndarray, Y: np.ndarray) -> np.ndarray:
+    def _slopes(
+        self, name: str, segment: Segment, s: np.ndarray, Y: np.ndarray, shift: np.ndarray | None
+    ) -> np.ndarray:
         """Return the derivatives (k, q, M) of all q results of a generated function."""
         system = self.system
         function = differentiated_rows(getattr(system.code.module, name))
@@ -66,11 +76,11 @@ class QuantityDerivatives:
         x = segment.dense(s)
         with np.errstate(divide="ignore", invalid="ignore"):  # of derivatives that do not exist
             try:
-                return self._evaluated(function, count, segment, s, x, Y)
+                return self._evaluated(function, count, segment, s, x, Y, shift)
             except ValueError:  # a condition has different values at these times
                 here = [slice(k, k + 1) for k in range(len(s))]
                 return np.concatenate(
-                    [self._evaluated(function, count, segment, s[k], x[k], Y[k]) for k in here]
+                    [self._evaluated(function, count, segment, s[k], x[k], Y[k], shift) for k in here]
                 )
 
     def _evaluated(
@@ -81,6 +91,7 @@ class QuantityDerivatives:
         s: np.ndarray,
         x: np.ndarray,
         Y: np.ndarray,
+        shift: np.ndarray | None,
     ) -> np.ndarray:
         """Evaluate a differentiated function at all times at once, or at a single time."""
         n, width = self.system.n, Y.shape[2]
@@ -94,8 +105,11 @@ class QuantityDerivatives:
         p = self._vector.lifted(segment.p, d, Y[0, n:], self._G)
         if not is_single:
             p = [Dual(one.value, one.slope[:, None]) if isinstance(one, Dual) else one for one in p]
+        time: Any = s[0] if is_single else s
+        if shift is not None:
+            time = Dual(time, shift if is_single else shift[:, None])
         out: list[Any] = [0.0] * count
-        function(s[0] if is_single else s, states, p, segment.z, out)
+        function(time, states, p, segment.z, out)
         if is_single:
             return values_and_slopes(out, width)[1][None]
         rows = [

@@ -13,11 +13,13 @@ from hybridsim.analysis.compare.comparison_request import checked_names
 from hybridsim.analysis.variations.both_sides import BothSides, OneSide
 from hybridsim.analysis.variations.directions import Directions
 from hybridsim.analysis.variations.over_time import Derivatives, OverTime
+from hybridsim.analysis.variations.readings import ReadingDerivatives, Readings, quantities_of
 from hybridsim.analysis.variations.refused import refuse_limits
 from hybridsim.analysis.variations.values.parameters import start_slopes, value_slopes
 from hybridsim.arguments import cannot_be, flag
 from hybridsim.calls import refusing
 from hybridsim.errors import UsageError
+from hybridsim.expr.grammar import TIME
 from hybridsim.model.parts.remedies import remedy_for_parameter
 from hybridsim.presentation.readable import Readable, aligned
 from hybridsim.solution import Solution
@@ -92,6 +94,63 @@ class Sensitivities(Readable):
         """
         chosen = self.states if names is None else checked_names(names, "names")
         return self._over_time.at(t, chosen, side)
+
+    @refusing
+    def of(
+        self, reading: str, *quantities: str, t_span: tuple[float, float] | None = None
+    ) -> ReadingDerivatives:
+        """Return a reading of the run and its derivatives: an extreme value, an amplitude, an integral or a mean.
+
+        ::
+
+            maximum     dq at the place of the maximum, where q' = 0; dq + q' dt at an event at the time t
+            integral    integral of dq, plus (q- - q+) dt of each event at which q jumps
+
+        dq is the derivative of the quantity q at a fixed time, as `at` returns it. The rule for the maximum is the
+        envelope theorem. The integral is that of `Solution.integral`, between the events.
+
+        Parameters
+        ----------
+        reading : str
+            "minimum", "maximum", "amplitude" = (maximum - minimum)/2, "integral", or "mean" = integral/(b - a).
+        *quantities : str
+            Name of a state or quantity, as for `at`. An integral and a mean accept several, of which they take the
+            product, and "t", which is time.
+        t_span : (a, b), optional
+            A part of the run with fixed ends; by default all of it.
+
+        Returns
+        -------
+        ReadingDerivatives
+            The value, and arrays ``by_start`` (n + d,) and ``by_parameter`` (P,). A derivative that differs on the two
+            sides of a guard is NaN, as in `by_parameter`.
+
+        Raises
+        ------
+        UsageError
+            For an unknown name; if the extreme value is reached at several times and a change of the run moves the
+            values apart; if it is at an end of the time span at which an event happens; or if the quantity varies
+            too fast.
+
+        Examples
+        --------
+        >>> import hybridsim as hs
+        >>> run = hs.simulate("free-decay", (0, 20))
+        >>> found = hs.sensitivities(run, ["mu"]).of("minimum", "x")
+        >>> found.by_parameter.shape
+        (1,)
+        """
+        names = quantities_of(reading, quantities)
+        over = self._over_time
+        over.require([name for name in names if name != TIME])
+        first, last = over.solution._part(t_span)
+        if first == last:
+            raise cannot_be("t_span", t_span, "use two different times")
+        changes = [*(f"the start of {name}" for name in self.states), *self.parameters]
+        value, slopes = Readings(over, first, last, changes).of(reading, names)
+        starts = len(self.states)
+        title = f"{reading} of {' * '.join(names)}"
+        return ReadingDerivatives(title, value, slopes[:starts], slopes[starts:])
 
     def plot(self, *names: str) -> Any:
         """Draw the derivatives of the event times, dt/dp, over the event times; see `hybridsim.plot.event_slopes`.

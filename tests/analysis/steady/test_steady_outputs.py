@@ -13,7 +13,7 @@ import pytest
 from scipy.special import j0, j1
 
 import hybridsim as hs
-from hybridsim.analysis.steady.orbit import NODES, POINTS, Orbit
+from hybridsim.analysis.polynomials.orbit import NODES, POINTS, Orbit
 from hybridsim.errors import SimulationError
 
 STATES = 'x = {start = 0, der = "v"}\nv = {start = 0, der = "-x - 0.1*v + cos(2*t)"}'

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import legendre
 
-from hybridsim.analysis.steady.orbit import NODES, POINTS, TO_COEFFICIENTS, Orbit
+from hybridsim.analysis.polynomials.orbit import NODES, POINTS, TO_COEFFICIENTS, Orbit
 from hybridsim.solution import Solution
 
 _TAIL = 4  # last coefficients, which show whether the polynomial is accurate
@@ -58,13 +59,16 @@ class Sampler:
 
     The other quantities are outputs, discrete states, surfaces of contacts ("velocity of f") and all guards
     by number ("guard 3").
+
+    Parameters
+    ----------
+    chosen : names of states and quantities of the run; by default all of these.
     """
 
-    def __init__(self, solution: Solution, states_only: bool = False) -> None:
-        self.solution = solution
+    def __init__(self, solution: Solution, chosen: Sequence[str] | None = None) -> None:
+        self.solution, self.chosen = solution, chosen
         self.system = system = solution._system
         self.segments = solution._segments
-        self.states_only = states_only
         self.quantities = tuple(q for q in system.quantities if " in " not in q)
         self.discrete = tuple(d.name for d in system.model.discrete)
         self.guards = system.guard_count if system.has_tape else 0
@@ -75,27 +79,28 @@ class Sampler:
             *(f"velocity of {name}" for name in contacts),
             *(f"guard {g}" for g in range(self.guards)),
         )
-        self.names = (*system.names, *(() if states_only else others))
+        self.names = (*system.names, *others) if chosen is None else tuple(chosen)
 
     def __call__(self, index: np.ndarray, s: np.ndarray) -> np.ndarray:
         """Return the values (k, Q) of all quantities at local times in given segments."""
         x = self.segments.states(index, s)
-        if self.states_only:
-            return x
+        if self.chosen is not None and set(self.chosen) <= set(self.system.names):
+            return x[:, [self.system.names.index(name) for name in self.chosen]]
         out = np.empty((len(s), len(self.names)))
-        out[:, : self.system.n] = x
         order = np.argsort(index, kind="stable")
         numbers, first = np.unique(index[order], return_index=True)
         for i, chosen in zip(numbers.tolist(), np.split(order, first[1:]), strict=True):
-            out[chosen, self.system.n :] = self._others(i, s[chosen], np.ascontiguousarray(x[chosen]))
+            out[chosen] = self._within(i, s[chosen], np.ascontiguousarray(x[chosen]))
         return out
 
-    def _others(self, i: int, s: np.ndarray, x: np.ndarray) -> np.ndarray:
+    def _within(self, i: int, s: np.ndarray, x: np.ndarray) -> np.ndarray:
         system, segment = self.system, self.segments[i]
+        if self.chosen is not None:
+            return np.array(self.solution._of_model.values_at(self.chosen, segment, s, x)).T
         named = self.solution._of_model.values_in((*self.quantities, *self.discrete), segment, s, x)
-        columns = [np.reshape(named, (-1, len(s))).T]
+        columns = [x, np.reshape(named, (-1, len(s))).T]
         if not system.has_tape:  # for Python functions: no contacts, and guards without series
-            return columns[0]
+            return np.concatenate(columns, axis=1)
         surfaces = system.rows("surfaces", len(system.surface_of), s, x, segment.p, segment.z)
         guards = system.rows("guards", system.guard_count, s, x, segment.p, segment.z)
         guards[:, ~system.active(segment.z)] = 0.0  # guards of other modes
@@ -133,9 +138,9 @@ class _Finished(NamedTuple):
     is_smooth: np.ndarray
 
 
-def orbit_of(solution: Solution, *, states_only: bool = False) -> Orbit:
-    """Return a forward run, or the saved part of it, as an `Orbit`."""
-    sample = Sampler(solution, states_only)
+def orbit_of(solution: Solution, chosen: Sequence[str] | None = None) -> Orbit:
+    """Return a forward run, or the saved part of it, as an `Orbit` of some quantities, or of all."""
+    sample = Sampler(solution, chosen)
     index, s, _ = solution._segments.knots()
     same = (index[1:] == index[:-1]) & (s[1:] > s[:-1])
     steps = _Intervals(index[:-1][same], s[:-1][same], s[1:][same])
