@@ -10,7 +10,8 @@ from hybridsim.analysis.fit.record import Record
 from hybridsim.analysis.fit.unknown import start_of
 from hybridsim.analysis.variations.both_sides import BothSides
 from hybridsim.analysis.variations.over_time import OverTime
-from hybridsim.analysis.variations.sensitivities import directions_by, refuse
+from hybridsim.analysis.variations.refused import refuse
+from hybridsim.analysis.variations.sensitivities import directions_by
 from hybridsim.errors import UsageError
 from hybridsim.solution import Solution
 

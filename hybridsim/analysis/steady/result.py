@@ -3,23 +3,28 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from hybridsim.analysis.compare.comparison_request import checked_names
 from hybridsim.analysis.polynomials.orbit import Orbit as PeriodOrbit
 from hybridsim.analysis.polynomials.resolving import orbit_of
+from hybridsim.analysis.steady.derivatives import SteadySensitivities, steady_sensitivities
 from hybridsim.analysis.steady.measures import Measures
 from hybridsim.analysis.steady.motion import Motion
 from hybridsim.analysis.steady.period_readings import Summarised, summed
 from hybridsim.analysis.steady.shooting import Orbit, multipliers, rates_at_end
 from hybridsim.analysis.variations.sensitivities import derivatives
 from hybridsim.arguments import whole_number
+from hybridsim.calls import refusing
 from hybridsim.engine.system.system_cache import system_of
 from hybridsim.errors import HybridsimError, UsageError
 from hybridsim.files import fields_of
 from hybridsim.model import Model
+from hybridsim.model.parts.remedies import remedy_for_parameter
 from hybridsim.presentation.readable import Readable
 from hybridsim.solution import Solution
 
@@ -140,6 +145,52 @@ class SteadyState(Readable, Measures):
     def stable(self) -> bool:
         """Whether all multipliers are inside the unit circle, or on it within 100 rtol."""
         return bool((np.abs(self.multipliers) <= 1.0 + max(_NEUTRAL, 100.0 * self._motion.rtol)).all())
+
+    @refusing
+    def sensitivities(self, parameters: Sequence[str] | None = None) -> SteadySensitivities:
+        """Differentiate the periodic motion, its period and its readings by parameters.
+
+        ::
+
+            (I - M) dx = Phi_p dp + f dT
+
+        M is the monodromy matrix, Phi_p the derivative of the period map by the parameters, f the rates at the end and
+        dT the change of the period. It is known with forcing. Without forcing it follows from f . dx = 0.
+
+        Parameters
+        ----------
+        parameters : sequence of str, optional
+            Names of the parameters; by default all.
+
+        Returns
+        -------
+        SteadySensitivities
+            Derivatives of the start and the period. Its method ``of("amplitude", "x")`` differentiates readings.
+
+        Raises
+        ------
+        UsageError
+            For a motion without a period, a multiplier 1, a motion that touches a guard without an event, or
+            parameters that change several periods of the forcing by different factors.
+
+        Examples
+        --------
+        >>> import hybridsim as hs
+        >>> steady = hs.steady_state("dfcs")
+        >>> steady.sensitivities(["F0"]).of("amplitude", "x").by_parameter.shape
+        (1,)
+        """
+        known = [p.name for p in self.model.parameters]
+        chosen = known if parameters is None else checked_names(parameters, "parameters")
+        for name in chosen:
+            if name not in known:
+                raise UsageError(
+                    f"model {self.model.name} has no parameter {name!r}",
+                    remedy=remedy_for_parameter(self.model, name),
+                )
+        return steady_sensitivities(
+            self.solution, self._orbit, chosen, self.multipliers, self._is_free, self.kind == "equilibrium"
+        )
 
     def to_dict(self, harmonics: int = 5) -> dict[str, Any]:
         """Return all results as plain values, with harmonics up to a given order and their phases in radians.

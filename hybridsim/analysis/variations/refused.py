@@ -13,7 +13,19 @@ from hybridsim.solution.solution import Solution
 _ROUNDINGS = 4096.0
 
 
-def refuse_limits(solution: Solution) -> None:
+def refuse(solution: Solution) -> None:
+    """Reject runs of which derivatives cannot be computed."""
+    if solution._save != "all":
+        raise UsageError(
+            f"the run was made with keep={solution._save!r}, but derivatives need all of the run",
+            remedy="simulate it with keep='all'",
+        )
+    if solution.t_end <= solution.t_start:
+        raise UsageError("`solution` does not run forward in time", remedy="use a run with t1 > t0")
+    _refuse_limits(solution)
+
+
+def _refuse_limits(solution: Solution) -> None:
     """Reject a run in which accumulating events were not followed down to rounding errors."""
     components = {component.name: component for component in solution.components}
     before = solution.t_start

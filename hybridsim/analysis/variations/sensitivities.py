@@ -13,8 +13,8 @@ from hybridsim.analysis.compare.comparison_request import checked_names
 from hybridsim.analysis.variations.both_sides import BothSides, OneSide
 from hybridsim.analysis.variations.directions import Directions
 from hybridsim.analysis.variations.over_time import Derivatives, OverTime
-from hybridsim.analysis.variations.readings import ReadingDerivatives, Readings, quantities_of
-from hybridsim.analysis.variations.refused import refuse_limits
+from hybridsim.analysis.variations.readings.of_run import ReadingDerivatives, Readings, quantities_of
+from hybridsim.analysis.variations.refused import refuse
 from hybridsim.analysis.variations.values.parameters import start_slopes, value_slopes
 from hybridsim.arguments import cannot_be, flag
 from hybridsim.calls import refusing
@@ -290,15 +290,3 @@ def directions_by(
         parts.append(np.concatenate([chosen.reshape(len(names), len(starts)), slopes], axis=1))
     unmoved = np.zeros((len(by_parameter), len(starts)))
     return Directions(parts[0], parts[1], np.concatenate([unmoved, by_parameter], axis=1))
-
-
-def refuse(solution: Solution) -> None:
-    """Reject runs of which derivatives cannot be computed."""
-    if solution._save != "all":
-        raise UsageError(
-            f"the run was made with keep={solution._save!r}, but derivatives need all of the run",
-            remedy="simulate it with keep='all'",
-        )
-    if solution.t_end <= solution.t_start:
-        raise UsageError("`solution` does not run forward in time", remedy="use a run with t1 > t0")
-    refuse_limits(solution)

@@ -27,7 +27,7 @@ class VectorSlopes:
         p[:P] = with_slopes(p[:P], np.eye(P))
         out: list[Any] = [0.0] * layout.phases
         differentiated(module.rates)(0.0, [], p, [], out)
-        self._rates = values_and_slopes(out, P)[1]  # of the forcing's angular rates
+        self.rates = values_and_slopes(out, P)[1]  # of the forcing's angular rates
         self._signals = self._of_signals()
         n, d = system.n, layout.discrete
         self._fixed = np.zeros(
@@ -63,7 +63,7 @@ class VectorSlopes:
         below = found[self.system.n + 1 :, self.system.n + 1 + layout.discrete :]
         origin = float(p[layout.origin_at])
         if layout.phases:
-            below[layout.phases_at : layout.signals_at] = origin * self._rates
+            below[layout.phases_at : layout.signals_at] = origin * self.rates
         for k, signal in enumerate(self._signals):
             if not signal.is_fixed:
                 at = layout.signals_at + SIGNAL_SLOTS * k

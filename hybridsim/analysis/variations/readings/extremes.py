@@ -1,4 +1,4 @@
-"""This module finds the places at which a quantity of a run has its least or greatest value."""
+"""This module finds the points at which a quantity of a run has its least or greatest value."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class Extremes:
             )
             if (number, begin + length) > first and (number, begin) < last
         ]
-        self._orbit, self._begins, self._pieces = orbit, begins, inside
+        self._orbit, self._begins, self._inside = orbit, begins, inside
         self._series = orbit.of(name) @ TO_COEFFICIENTS.T
         if not np.isfinite(orbit.of(name)[inside]).all():
             raise UsageError(
@@ -64,10 +64,10 @@ class Extremes:
         self.size = float(np.abs(orbit.of(name)[inside]).max(initial=0.0))
         self._tie = max(_TIE, solution._run.task.tolerances.rtol) * self.size
 
-    def places(self, sign: int) -> list[Place]:
-        """Return the places of the greatest value (sign 1) or the least (sign -1), the best one first.
+    def attained(self, sign: int) -> list[Place]:
+        """Return the points of the greatest value (sign 1) or the least (sign -1), the best one first.
 
-        Values that differ by less than the accuracy of the run are equal. Of places that are not separated by other
+        Values that differ by less than the accuracy of the run are equal. Of points that are not separated by other
         values, one is returned.
         """
         found = [*self._turns(sign), *self._ends(sign), *self._plateaus()]
@@ -75,17 +75,17 @@ class Extremes:
         rough = sign * self._rough()
         if not found or (rough.size and rough.max() >= sign * found[0].value - self._tie):
             raise UsageError(
-                f"{self.name} has a kink or a jump at its extreme value, at a time that is no event of the run",
+                f"{self.name} has a kink or a jump at its extreme value, between two events of the run",
                 remedy=_REMEDY,
             )
         equal = [place for place in found if abs(place.value - found[0].value) <= self._tie]
         chosen = [self._representative(group, sign) for group in self._groups(equal, sign)]
         return sorted(chosen, key=lambda place: -sign * place.value)
 
-    def _groups(self, places: list[Place], sign: int) -> list[list[Place]]:
-        """Group places between which all values are equal to theirs."""
-        least = min(sign * place.value for place in places) - self._tie
-        ordered = sorted(places, key=lambda place: (place.number, place.s))
+    def _groups(self, points: list[Place], sign: int) -> list[list[Place]]:
+        """Group points between which all values are equal to theirs."""
+        least = min(sign * place.value for place in points) - self._tie
+        ordered = sorted(points, key=lambda place: (place.number, place.s))
         groups = [ordered[:1]]
         for place in ordered[1:]:
             last = groups[-1][-1]
@@ -98,7 +98,7 @@ class Extremes:
         return groups
 
     def _least_between(self, k: int, one: Place, other: Place, sign: int) -> float:
-        """Return the least value (sign 1) of piece k between two places, or minus the greatest one."""
+        """Return the least value (sign 1) of piece k between two points, or minus the greatest one."""
         low = self._local(k, one.s) if k == one.piece else -1.0
         high = self._local(k, other.s) if k == other.piece else 1.0
         return float((sign * legendre.legval(low + (high - low) * _BETWEEN, self._series[k])).min())
@@ -110,10 +110,10 @@ class Extremes:
         return max(near, key=lambda place: (place.where == HELD, place.where != INSIDE, sign * place.value))
 
     def refuse_jumps(self) -> None:
-        """Raise `UsageError` if the quantity jumps at a time that is no event of the run."""
+        """Raise `UsageError` if the quantity jumps between two events of the run."""
         if (np.ptp(self._rough(), axis=1) > _JUMPS * self.size).any():
             raise UsageError(
-                f"{self.name} jumps, or varies too fast, at a time that is no event of the run, so its integral has "
+                f"{self.name} jumps, or varies too fast, between two events of the run, so its integral has "
                 "no known derivative",
                 remedy=_REMEDY,
             )
@@ -138,7 +138,7 @@ class Extremes:
             number, s = int(orbit.segments[k]), self._begins[k] + (t - orbit.starts[k])
             if is_minimum == (sign < 0) and orbit.is_smooth[k, 0] and self._is_between(number, s):
                 found.append(Place(number, float(s), INSIDE, value, k))
-        for k in self._pieces:
+        for k in self._inside:
             number, s = int(orbit.segments[k]), self._at(k, 1.0)
             if (
                 k + 1 < len(orbit.segments)
@@ -153,9 +153,9 @@ class Extremes:
     def _ends(self, sign: int) -> list[Place]:
         """Return the ends of each segment, or of the part, towards which the quantity rises (sign 1) or falls."""
         orbit, found = self._orbit, []
-        numbers = orbit.segments[self._pieces]
+        numbers = orbit.segments[self._inside]
         for number in np.unique(numbers).tolist():
-            own = np.array(self._pieces)[numbers == number]
+            own = np.array(self._inside)[numbers == number]
             segment = self._segments[number]
             for k, end, limit, where in (
                 (int(own[0]), -1, self._first, START),
@@ -173,7 +173,7 @@ class Extremes:
         orbit = self._orbit
         return [
             Place(int(orbit.segments[k]), self._at(k, local), HELD, value, int(k))
-            for k in self._pieces
+            for k in self._inside
             if not orbit.is_smooth[k, 0] and np.ptp(orbit.values[k, :, 0]) == 0.0
             for local, value in zip(NODES.tolist(), orbit.values[k, :, 0].tolist(), strict=True)
             if self._is_between(int(orbit.segments[k]), self._at(k, local))
@@ -181,8 +181,8 @@ class Extremes:
 
     def _rough(self) -> np.ndarray:
         """Return the values (k, POINTS) on the pieces that no polynomial represents."""
-        values = self._orbit.values[self._pieces, :, 0]
-        is_rough = ~self._orbit.is_smooth[self._pieces, 0] & (np.ptp(values, axis=1) != 0.0)
+        values = self._orbit.values[self._inside, :, 0]
+        is_rough = ~self._orbit.is_smooth[self._inside, 0] & (np.ptp(values, axis=1) != 0.0)
         return np.asarray(values[is_rough])
 
     def _slope(self, k: int, local: float) -> float:

@@ -19,8 +19,8 @@ from typing import Any
 import numpy as np
 
 from hybridsim.analysis.compare.comparison_request import checked_names
-from hybridsim.analysis.variations.extremes import END, START, Extremes, Place
 from hybridsim.analysis.variations.over_time import OverTime
+from hybridsim.analysis.variations.readings.extremes import END, START, Extremes, Place
 from hybridsim.arguments import text
 from hybridsim.errors import UsageError, nearest
 from hybridsim.expr.grammar import TIME
@@ -109,22 +109,22 @@ class Readings:
     # -- extreme values -------------------------------------------------------------------------------------
 
     def _extreme(self, extremes: Extremes, sign: int) -> tuple[float, np.ndarray]:
-        """Return an extreme value and its derivatives (M,), which are the same at all places with this value."""
-        places = extremes.places(sign)
-        slopes = np.array([self._at(extremes, place) for place in places])
+        """Return an extreme value and its derivatives (M,), which are the same at all points with this value."""
+        points = extremes.attained(sign)
+        slopes = np.array([self._at(extremes, place) for place in points])
         least = _ROUNDING * extremes.size / self._found.own_sizes()
-        for place, slope in zip(places[1:], slopes[1:], strict=True):
+        for place, slope in zip(points[1:], slopes[1:], strict=True):
             apart = np.abs(slope - slopes[0]) > _AGREE * (np.abs(slope) + np.abs(slopes[0])) + least
             if apart.any():
                 kind = "maximum" if sign > 0 else "minimum"
-                times = " and ".join(f"t = {self._time(one):.9g}" for one in (places[0], place))
+                times = " and ".join(f"t = {self._time(one):.9g}" for one in (points[0], place))
                 by = " and ".join(np.array(self._changes)[apart])
                 raise UsageError(
                     f"the {kind} of {extremes.name} is at {times} with the same value {place.value:.9g}, and a change "
                     f"of {by} moves the two values apart, so there is no derivative",
                     remedy="use a part of the run with one of these times, t_span=(a, b)",
                 )
-        return places[0].value, slopes[0] + 0.0 * slopes.sum(axis=0)  # NaN if it is NaN at one of the places
+        return points[0].value, slopes[0] + 0.0 * slopes.sum(axis=0)  # NaN if it is NaN at one of the points
 
     def _at(self, extremes: Extremes, place: Place) -> np.ndarray:
         """Return the derivatives (M,) of the value at a place, which moves with an event at an end of a segment."""
@@ -144,6 +144,11 @@ class Readings:
 
     def _time(self, place: Place) -> float:
         return float(self._solution._segments[place.number].origin.plus(place.s))
+
+    def at_end(self, names: Sequence[str]) -> float:
+        """Return the value of a product at the end of the run, just before any event there."""
+        lengths = np.diff(self._solution._segments.spans(), axis=1)
+        return self._product(names, int(np.flatnonzero(lengths > 0.0)[-1]), -1)
 
     # -- integrals ------------------------------------------------------------------------------------------
 
