@@ -293,7 +293,7 @@ def absolute_tolerances(model: Model, atol: Any, rtol: float, start: np.ndarray)
 
 
 def initial_modes(system: System, z0: Any) -> np.ndarray:
-    """Return the index of the initial mode of each component, or -1 if a surface selects it."""
+    """Return the index of the initial mode of each component, or -1 if a surface selects the mode."""
     z = np.array([a.initial for a in system.automata], dtype=np.int64)
     if z0 is None:
         return z

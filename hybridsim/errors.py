@@ -149,7 +149,7 @@ class ModelError(HybridsimError):
 
     @property
     def errors(self) -> tuple[ModelError, ...]:
-        """Every single error; a one-element tuple with this error if it contains no others."""
+        """Every single error, as a tuple; an error that combines no other errors is the only element."""
         return self._errors or (self,)
 
     def inside(self, use: str) -> tuple[ModelError, ...]:
@@ -161,7 +161,7 @@ class ModelError(HybridsimError):
 
     @classmethod
     def collect(cls, errors: Iterable[ModelError], title: str) -> ModelError:
-        """Return a single error itself, or combine several errors into one that lists them by line."""
+        """Return a single error itself, or combine several errors into one error that lists them by line."""
         # errors with equal texts are reported once
         every = {str(single): single for error in errors for single in error.errors}
         found = sorted(every.values(), key=_line)

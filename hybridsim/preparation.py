@@ -54,7 +54,7 @@ class _Settings(NamedTuple):
 
 
 class _SettingsOfRuns(dict[tuple[Any, ...], _Settings]):
-    """Settings by the arguments of runs; a pickled model leaves them behind, because a method may be a local class."""
+    """Settings by the arguments of runs. Models are pickled without settings, because a method may be a local class."""
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _SettingsOfRuns, ()

@@ -72,7 +72,8 @@ def check_arguments(args: argparse.Namespace) -> None:
         if str(args.save) in ("all", "events", "last-period", "nothing"):
             raise UsageError(
                 f"--save needs a file name, not '{args.save}'",
-                remedy=f"use --save run.hsol to write the solution, or --keep {args.save} to choose what is stored",
+                remedy=f"use --save run.hsol to write the solution, or --keep {args.save} to choose the "
+                "stored results",
             )
         require_writable(args.save, "--save", (".hsol",))
     others = {"the file of the model": Path(args.model)} if Path(getattr(args, "model", "")).is_file() else {}

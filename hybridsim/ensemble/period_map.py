@@ -91,7 +91,7 @@ def _hold(automata: Any, z: Any, matrix: Any) -> None:
 
 @kernel
 def carry_derivative(packs: Any, lin: Any, count: int, scratch: Any) -> None:
-    """Write the derivative of the last state of the recorded segments by the first one to `scratch.matrix`."""
+    """Write the derivative of the last state of the recorded segments by the first state to `scratch.matrix`."""
     automata, record, rows, work, own = (
         packs.model.automata,
         packs.record,

@@ -132,7 +132,7 @@ def run_ensemble(
 
 @inlined
 def _begin(record: Any, stored: int, count: int, since: float) -> tuple[int, float]:
-    """Return the segment that contains an instant, and the local time, or -1 if there is none."""
+    """Return the segment that contains an instant, and the local time, or -1 if no segment contains the instant."""
     first = SEGMENTS + count - 1
     while first >= SEGMENTS - stored:
         high, low = record.clocks[first, 0], record.clocks[first, 1]

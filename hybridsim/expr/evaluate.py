@@ -1,4 +1,4 @@
-"""Evaluate expressions, and parameters that are expressions of each other, in double precision."""
+"""Evaluate expressions, and parameters that depend on each other, in double precision."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def resolve(expressions: Mapping[str, Expression]) -> dict[str, float]:
 
 
 def dependency_order(expressions: Mapping[str, Expression], kind: str) -> list[str]:
-    """Return the names in an order in which each name depends only on earlier ones.
+    """Return the names in an order in which each name depends only on earlier names.
 
     Raises
     ------
@@ -92,7 +92,7 @@ def dependency_order(expressions: Mapping[str, Expression], kind: str) -> list[s
                     f"cyclic dependency among {kind}: {' -> '.join(circle)}",
                     circle,
                     place=expressions[path[-1]].error("").place,
-                    remedy="set one of them to an independent value",
+                    remedy=f"set one of these {kind} to an independent value",
                 )
             path.append(name)
             stack.append((name, True))

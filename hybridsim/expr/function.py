@@ -13,7 +13,7 @@ from hybridsim.expr.parse import Expression
 
 @dataclass(frozen=True)
 class FunctionExpression(Expression):
-    """A function f(t, x, p) of a model with a Python flow; equal if the functions are equal."""
+    """A function f(t, x, p) of a model with a Python flow; two objects with the same function are equal."""
 
     function: Callable[..., Any]
 

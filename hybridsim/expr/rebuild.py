@@ -35,7 +35,7 @@ def with_names(node: ast.expr, parts: Mapping[str, ast.expr]) -> ast.expr:
 
 
 def exchanged(node: ast.expr, old: ast.expr, new: ast.expr) -> ast.expr:
-    """Return a tree in which all occurrences of one part are replaced by another."""
+    """Return a tree in which all occurrences of one part are replaced by another part."""
     text = ast.dump(old)
 
     def change(part: ast.expr) -> ast.expr:

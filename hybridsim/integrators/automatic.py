@@ -128,7 +128,7 @@ def _is_apart(system: System, x: np.ndarray, z: np.ndarray, t0: float) -> bool:
 
 
 def _eigenvalues(system: System, x: np.ndarray, z: np.ndarray, t0: float) -> np.ndarray:
-    """Return the eigenvalues of the Jacobian at the start, or none if it is not finite."""
+    """Return the eigenvalues of the Jacobian at the start, or no eigenvalues if the Jacobian is not finite."""
     none = np.zeros(0, dtype=complex)
     if not system.n:
         return none

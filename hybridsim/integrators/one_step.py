@@ -96,7 +96,7 @@ class OneStepStepper(ABC):
         return True
 
     def step(self) -> Step:
-        """Take steps until one is accepted, and return it."""
+        """Take steps until a step is accepted, and return this step."""
         direction, start = math.copysign(1.0, self.bound), self.here
         while True:
             h = min(self.h, self.tolerances.max_step)

@@ -142,7 +142,7 @@ _ELSEWHERE = {
 
 
 def keyword_elsewhere(keyword: str) -> str | None:
-    """Return the remedy for a keyword of another tool; it names the equivalent argument of `simulate`."""
+    """Return the remedy for a keyword of another tool: the name of the equivalent argument of `simulate`."""
     return _ELSEWHERE.get(keyword)
 
 

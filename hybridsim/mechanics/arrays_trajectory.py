@@ -176,5 +176,5 @@ class ArraysTrajectory(ABC):
         if self.save != "all":
             raise UsageError(
                 f"the run was made with keep={self.save!r}, which keeps no states between start and end",
-                remedy="simulate it with keep='all'",
+                remedy="repeat the run with keep='all'",
             )

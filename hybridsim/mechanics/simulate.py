@@ -144,7 +144,7 @@ def _start(system: MechanicalSystem, x0: Any) -> np.ndarray:
 
 
 def _absolute(system: MechanicalSystem, atol: Any, rtol: float, start: np.ndarray) -> np.ndarray:
-    """Return the absolute tolerances (2n,), by default rtol * 1e-3 * |x0|, or 1 where x0 is zero."""
+    """Return the absolute tolerances (2n,), by default rtol * 1e-3 * |x0|, with 1 in place of a zero |x0|."""
     if atol is None:
         return 1e-3 * rtol * np.where(start == 0.0, 1.0, abs(start))
     remedy = f"use a number >= 0, or {len(start)} of them"

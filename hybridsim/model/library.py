@@ -205,7 +205,7 @@ def _packaged_law(name: str) -> FrictionLaw:
 
 
 def law_of_text(text: str, path: str) -> tuple[FrictionLaw, list[str]]:
-    """Return the only law in the text of a file, and all files that it was read from."""
+    """Return the only law in the text of a file, and all files from which the law was read."""
     from hybridsim.model.toml.laws import read_laws
     from hybridsim.model.toml.read import open_text
 

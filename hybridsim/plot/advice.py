@@ -1,4 +1,4 @@
-"""This module draws the result of `advise`: errors of simplified models, or a map of the adequate ones."""
+"""This module draws the result of `advise`: errors of simplified models, or a map of the adequate models."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ _MOST = 6  # panels by default
 def event_slopes(
     result: Sensitivities, names: Sequence[str] = (), *, axes: Sequence[Axes] | None = None
 ) -> tuple[Axes, ...]:
-    """Draw the derivatives of the event times of a run over these times, with a panel for each parameter.
+    """Draw the derivatives of the event times of a run over the event times, with a panel for each parameter.
 
     The value at an event is dt/dp: the delay of the event per unit of the parameter or of the initial state.
 
@@ -37,7 +37,7 @@ def event_slopes(
     """
     if not len(result.times):
         raise UsageError(
-            "the run has no events, whose times could be drawn",
+            "the run has no events, so there are no event times to draw",
             remedy="print the sensitivities for the derivatives of the end of the run",
         )
     known = {**dict.fromkeys(result.states), **dict.fromkeys(result.parameters)}

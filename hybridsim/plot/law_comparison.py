@@ -1,4 +1,4 @@
-"""This module draws a comparison of friction laws: the friction loops, and the amplitudes beside them."""
+"""This module draws a comparison of friction laws: the friction loops, with the amplitudes beside the loops."""
 
 from __future__ import annotations
 

@@ -109,7 +109,7 @@ def _equal_scales(axes: Axes, spans: Sequence[tuple[float, float]]) -> None:
 
 
 def _concerned(solution: Solution, drawn: set[str]) -> list[str]:
-    """Return the components that affect the drawn quantities, or all components if there are none."""
+    """Return the components that affect the drawn quantities, or all components if no component affects them."""
     forces = [contact.name for contact in solution.model.contacts if contact.name in drawn]
     moved = [contact.name for contact in solution.model.contacts if drawn & contact.velocity.names]
     return forces or moved or [component.name for component in solution.components]

@@ -65,7 +65,7 @@ def label_axis(
 
 
 def shared_powers(quantities: Mapping[str, tuple[str, float, float]]) -> dict[str, int]:
-    """Return one power of ten for all quantities of one base unit, such as m and m/s, where it suits them all.
+    """Return one power of ten for all quantities of one base unit, such as m and m/s, if one power suits all of them.
 
     `quantities` has the unit and the least and the largest value of each name. A quantity without an entry in the
     result has a power of its own.
@@ -84,7 +84,7 @@ def shared_powers(quantities: Mapping[str, tuple[str, float, float]]) -> dict[st
 
 
 def _misfit(power: int, sizes: Iterable[float]) -> float:
-    """Return by how many digits numbers leave the range from 1 to 1000; a prefix counts a little."""
+    """Return the number of digits by which numbers leave the range from 1 to 1000; a prefix adds a small amount."""
     over = (max(power - size, size - power - 3, 0.0) for size in sizes)
     return round(sum(over) + (_PREFIX_COST if power else 0.0), 9)
 
@@ -94,7 +94,7 @@ def _prefixed(unit: str, power: int) -> str:
 
 
 def scaled_unit(unit: str, low: float, high: float) -> tuple[int, str]:
-    """Return a power of ten that suits values from low to high, and the unit with its prefix if it takes one."""
+    """Return a power of ten that suits values from low to high, and the unit, with its prefix if it accepts one."""
     size = max(abs(low), abs(high))
     power = 3 * math.floor(math.log10(size) / 3 + 1e-9) if size > 0 and math.isfinite(size) else 0
     power = min(max(power, -12), 9)

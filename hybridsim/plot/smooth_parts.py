@@ -66,7 +66,8 @@ def refuse_arrays(solution: Any) -> None:
     if isinstance(solution.model, MechanicalSystem):
         raise UsageError(
             f"{type(solution).__name__} of {solution.model.name} cannot be drawn by this function",
-            remedy="draw its time history with sol.plot(), or simulate system.to_model() and draw that",
+            remedy="draw its time history with sol.plot(), or simulate system.to_model() and draw the "
+            "new solution",
         )
 
 
@@ -94,7 +95,7 @@ def window_of(solution: Solution, t_span: tuple[float, float] | None) -> Window:
 
 
 def _period(model: Any) -> float | None:
-    """Return the period of the forcing, or None if there is no single one."""
+    """Return the period of the forcing, or None if there is no single period."""
     if not isinstance(model, MechanicalSystem):
         return forcing_period(model)
     signals = [signal for terms in model.forcing.values() for signal in terms]
@@ -104,7 +105,7 @@ def _period(model: Any) -> float | None:
 
 
 def event_times(solution: Solution, kinds: Collection[str]) -> NDArray[np.float64]:
-    """Return the times of the events of given kinds; those of a `MechanicalSystem` are read as arrays."""
+    """Return the times of the events of given kinds; the events of a `MechanicalSystem` are read as arrays."""
     if isinstance(solution.model, MechanicalSystem):
         parts = solution.modes if "transition" in kinds else ()
         return np.concatenate([[], *(solution.event_times(part) for part in parts)])
@@ -112,7 +113,7 @@ def event_times(solution: Solution, kinds: Collection[str]) -> NDArray[np.float6
 
 
 def _last_events(solution: Solution, start: float, end: float) -> Window:
-    """Return the whole run, or its last events if very many events are spread over it."""
+    """Return the whole run, or its last events if very many events are spread over the run."""
     times = event_times(solution, ["transition"])
     if len(times) <= _MAX_EVENTS:
         return Window(start, end)
@@ -124,7 +125,7 @@ def _last_events(solution: Solution, start: float, end: float) -> Window:
 
 
 def _input_jumps(solution: Solution, window: Window) -> NDArray[np.float64]:
-    """Return the times in a window at which an input jumps; an input with very many knots has none."""
+    """Return the times in a window at which an input jumps; inputs with very many knots are left out."""
     jumps: list[NDArray[np.float64]] = []
     inputs = getattr(solution.model, "inputs", ())
     for declared, signal in zip(inputs, solution._system.signals if inputs else ()):
@@ -156,7 +157,7 @@ def title_of(model: Any, name: str) -> str:
 
 
 def known_units(solution: Solution) -> dict[str, str]:
-    """Return the units of states and other quantities by name; a `MechanicalSystem` declares none."""
+    """Return the units of states and other quantities by name; a `MechanicalSystem` declares no units."""
     if isinstance(solution.model, MechanicalSystem):
         return dict.fromkeys(solution.names, "")
     return units_of(solution.model)
@@ -183,11 +184,11 @@ def extent(smooth_parts: Sequence[SmoothPart], name: str) -> tuple[float, float]
 
 
 def require_length(window: Window) -> None:
-    """Raise an error for a part of a run that is one instant."""
+    """Raise an error if the part of a run to be drawn has zero length."""
     if not window.t1 > window.t0:
         raise UsageError(
             f"there is no curve from t = {window.t0:g} to {window.t1:g}",
-            remedy="draw a longer run, or a longer part of it with `t_span`",
+            remedy="draw a longer run, or select a longer part of the run with `t_span`",
         )
 
 

@@ -48,7 +48,7 @@ def dress(axes: Axes) -> None:
 
 
 def literal(text: str) -> str:
-    """Return text in which dollar signs are escaped, so that matplotlib does not read it as mathematics."""
+    """Return text in which dollar signs are escaped, so that matplotlib does not treat the text as mathematics."""
     return text.replace("$", r"\$")
 
 
@@ -66,7 +66,7 @@ def head(axes: Axes, *parts: str, above: float = 0.0) -> None:
 
 
 def point_along(axes: Axes, x: NDArray[np.float64], y: NDArray[np.float64], colour: str) -> None:
-    """Draw an arrow head halfway along a curve, in its direction."""
+    """Draw an arrow head halfway along a curve, in the direction of the curve."""
     wide, high = (float(np.ptp(limits)) or 1.0 for limits in (axes.get_xlim(), axes.get_ylim()))
     lengths = np.hypot(np.diff(x) / wide, np.diff(y) / high)
     if lengths.size == 0 or not lengths.sum() > 0:
@@ -106,7 +106,7 @@ def figure(width: float, height: float) -> Figure:
 
 
 def wrapped(*parts: str) -> str:
-    """Return the title of a whole picture of the usual width: each part begins a new line."""
+    """Return the title of a whole picture of the usual width, in which each part begins a new line."""
     return literal("\n".join(line for part in parts for line in textwrap.wrap(part, round(WIDTH * _LETTERS))))
 
 

@@ -1,4 +1,4 @@
-"""This module draws results of a sweep as lines over one parameter, one line for each value of the other."""
+"""This module draws results of a sweep as lines over one parameter, one line for each value of the other parameter."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _WIDTH, _HEIGHT, _MORE = 7.2, 2.0, 1.1  # inches of a panel, and of the space ab
 def sweep_lines(
     result: Sweep, *names: str, over: str | None = None, axes: tuple[Axes, ...] | None = None
 ) -> tuple[Axes, ...]:
-    """Draw results of a sweep over one parameter, with a panel for each; arrays are drawn as dots.
+    """Draw results of a sweep over one parameter, with a panel for each result; arrays are drawn as dots.
 
     Parameters
     ----------

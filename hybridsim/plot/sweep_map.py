@@ -32,7 +32,7 @@ _BETWEEN = 0.12  # inches on each side, so that the label of a colour bar is not
 
 
 def sweep_map(result: Sweep, *names: str, axes: tuple[Axes, ...] | None = None) -> tuple[Axes, ...]:
-    """Draw results of a sweep over two parameters as maps: the first is vertical, the second horizontal.
+    """Draw results of a sweep over two parameters as maps: the first parameter is vertical, the second is horizontal.
 
     Points without a result are grey.
 

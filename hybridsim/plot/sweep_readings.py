@@ -32,7 +32,7 @@ NO_COLOUR = "#d8d8d8"  # grey for points without a result, which no scale of col
 
 
 def chosen_names(result: Sweep, names: Sequence[str], arrays: bool) -> tuple[str, ...]:
-    """Return the names of the requested results of a sweep, by default the most common ones.
+    """Return the names of the requested results of a sweep, by default the most common results.
 
     Raises
     ------
@@ -53,7 +53,7 @@ def chosen_names(result: Sweep, names: Sequence[str], arrays: bool) -> tuple[str
 
 
 def _first_asked_for(drawable: Sequence[str]) -> tuple[str, ...]:
-    """Return the names of up to six results: first one of each common kind, then others."""
+    """Return the names of up to six results: first one result of each common kind, then other results."""
 
     def rank(name: str) -> tuple[int, int]:
         kind = name.partition(".")[0]
@@ -96,7 +96,7 @@ def label_of(result: Sweep, name: str) -> str:
 
 
 def show_range(axis: Axis, values: np.ndarray) -> None:
-    """Widen the range of an axis if all values are equal but for rounding, so that no noise is enlarged."""
+    """Widen the range of an axis if all values are equal within rounding, so that no noise is enlarged."""
     low, high = range_of(values)
     size = max(abs(low), abs(high))
     if high - low <= _ROUNDING * size:
@@ -126,7 +126,7 @@ def label_result(axis: Axis, result: Sweep, name: str, values: np.ndarray) -> No
 
 
 def draw_map(panel: Axes, result: Sweep, values: np.ndarray, **colours: Any) -> QuadMesh:
-    """Draw a value for each point of two parameters: the first is vertical, the second horizontal."""
+    """Draw a value for each point of two parameters: the first parameter is vertical, the second is horizontal."""
     coordinates = []
     for dimension, parameter in enumerate(result.axes):
         numbers = positions(result.axes[parameter])
@@ -143,7 +143,7 @@ def draw_map(panel: Axes, result: Sweep, values: np.ndarray, **colours: Any) -> 
 
 
 def require_one_axes_each(axes: Sequence[Axes], names: Sequence[str]) -> None:
-    """Raise an error if the number of axes is not that of the results."""
+    """Raise an error if the number of axes differs from the number of results."""
     if len(axes) != len(names):
         raise UsageError(
             f"{len(axes)} axes were passed for {len(names)} results", remedy="use one axes per result"

@@ -18,7 +18,7 @@ _UNITS = {"us": "µs", "um": "µm", "degC": "°C", "deg": "°", "ohm": "Ω", "Oh
 
 
 def label_of(name: str, title: str) -> tuple[str, str]:
-    """Return the title and the symbol of a quantity on an axis; a title replaces a name that is no symbol.
+    """Return the title and the symbol of a quantity on an axis; a title replaces a name that is not a symbol.
 
     The name of a quantity of a part remains, because its title does not name the part.
     """
@@ -28,7 +28,7 @@ def label_of(name: str, title: str) -> tuple[str, str]:
 
 
 def symbol_of(name: str) -> str:
-    """Return the symbol of a quantity: a letter with an index where the name is one, otherwise the name."""
+    """Return the symbol of a quantity: a letter with an index if the name has this form, otherwise the name."""
     found = _SYMBOL.fullmatch(name)
     if found is None:
         return literal(name)

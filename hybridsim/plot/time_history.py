@@ -146,7 +146,7 @@ def _unasked(solution: Solution) -> list[list[str]]:
 
 
 def _looks(count: int, taken: Collection[str]) -> list[tuple[str, Any]]:
-    """Return colours and dashes of the curves of a panel; black if there is one, and no other colour that is taken."""
+    """Return colours and dashes of the curves of a panel; a single curve is black, and taken colours are avoided."""
     if count == 1:
         return [(style.INK, "-")]
     colours = [style.INK, *([colour for colour in _CURVES if colour not in taken] or _CURVES)]
@@ -156,7 +156,7 @@ def _looks(count: int, taken: Collection[str]) -> list[tuple[str, Any]]:
 def _name_curves(
     axis: Axes, model: Any, panel: Sequence[str], units: Sequence[str], looks: Sequence[tuple[str, Any]]
 ) -> float:
-    """Write the symbols of several curves above their panel, and what their titles share beside it.
+    """Write the symbols of several curves above their panel, with the common part of their titles beside the symbols.
 
     The unit is beside the panel if all curves have the same, otherwise behind each symbol.
     """
@@ -174,7 +174,7 @@ def _name_curves(
 
 
 def _marks_in(solution: Solution, window: Window) -> dict[str, np.ndarray]:
-    """Return the times of the events in a window by kind; a near-grazing changes nothing and is left out."""
+    """Return the times of the events in a window by kind; near-grazings change nothing and are left out."""
     found = {kind: event_times(solution, [kind]) for kind in CUTS}
     return {kind: times[(window.t0 <= times) & (times <= window.t1)] for kind, times in found.items()}
 

@@ -136,7 +136,7 @@ def draw_panel(
 
 
 def _point(comparison: Comparison, row: Row, quantity: str) -> tuple[float, float] | None:
-    """Return (wall time, error), or None if it cannot be drawn."""
+    """Return (wall time, error), or None if the point cannot be drawn."""
     reading = comparison.reading(row, quantity)
     if reading is None or row.cost is None or not math.isfinite(reading.value):
         return None

@@ -49,7 +49,7 @@ def lines_of(
 
 
 def _primitive(primitive: Primitive) -> str:
-    """Return a line that says how hybridsim treats a non-smooth expression."""
+    """Return a line that describes how hybridsim treats a non-smooth expression."""
     text, remark = primitive.text, primitive.remark
     became = {
         COMPONENT: "two modes, continuous at the change of mode"

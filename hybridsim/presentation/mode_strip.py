@@ -30,7 +30,7 @@ class Bar(NamedTuple):
 
 
 def bars_of(intervals: Sequence[Interval], t0: float, t1: float, columns: int) -> tuple[list[Bar], bool]:
-    """Return the bars of a strip in the order of drawing, and whether any of them share a column.
+    """Return the bars of a strip in the order of drawing, and whether any bars share a column.
 
     An interval that is narrower than three columns gets a whole column besides its own bar: a hairline. Where several
     such intervals fall into one column, their modes share its height.

@@ -27,13 +27,13 @@ class ProgressLine:
         return time.monotonic() >= self._next
 
     def write(self, text: str) -> None:
-        """Write the line over its former text; only its beginning is shown, because a wrapped line stays."""
+        """Write the line over its former text. A long line is cut, because a wrapped line could not be overwritten."""
         line = text[:_WIDTH].rstrip()
         print("\r" + line.ljust(self.shown), end="", file=sys.stderr, flush=True)
         self.shown, self._next = len(line), time.monotonic() + _PAUSE
 
     def leave(self, end: str) -> None:
-        """Leave the line with a final text, if it is open."""
+        """End the line with a final text, if the line is open."""
         if self.shown:
             print(end, end="", file=sys.stderr, flush=True)
             self.shown, self._next = 0, time.monotonic() + self.wait
@@ -62,7 +62,7 @@ class ProgressBar:
             self.close()
 
     def close(self) -> None:
-        """End the line of the bar, if it is open."""
+        """End the line of the bar, if the line is open."""
         self._line.leave("\n")
 
     def __del__(self) -> None:

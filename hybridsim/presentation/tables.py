@@ -115,7 +115,7 @@ def event_frame(events: Sequence[Any], states: Sequence[str]) -> pd.DataFrame:
 
 
 def library(name: str) -> Any:
-    """Import pandas or xarray; raise an error if it is not installed."""
+    """Import pandas or xarray; raise an error if the library is not installed."""
     try:
         return import_module(name)
     except ImportError:

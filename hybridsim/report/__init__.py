@@ -1,4 +1,4 @@
-"""This package writes a run as one HTML page that needs no other file and no connection; start with `page`."""
+"""This package writes a run as one HTML page that needs no other file and no connection."""
 
 from hybridsim.report.page import write_report
 

@@ -103,7 +103,7 @@ def _extent(tables: list[Array]) -> tuple[Array, Array]:
 
 
 def _described(solution: Solution, names: list[str], low: Array, high: Array) -> list[dict[str, Any]]:
-    """Return name, unit with prefix, range, and whether the page opens with the curve, of each quantity."""
+    """Return for each quantity its name, unit with prefix, range, and whether the page shows its curve at first."""
     model: Model = solution.model
     units = units_of(model)
     units |= {relative_velocity(c.name): units.get(c.velocity.text, "") for c in model.contacts}

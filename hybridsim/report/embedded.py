@@ -19,7 +19,7 @@ def array(values: Any, kind: str) -> dict[str, str]:
 
 
 def numbers(values: Any) -> dict[str, str]:
-    """Return an array of numbers in single precision, or in double precision if that does not hold their size."""
+    """Return an array of numbers in single precision, or in double precision for very large or small numbers."""
     data = np.asarray(values, dtype=float)
     sizes = np.abs(data[np.isfinite(data) & (data != 0.0)])
     limits = np.finfo(np.float32)
@@ -35,7 +35,7 @@ def indices(values: Any) -> dict[str, str]:
 
 
 def json_in_html(value: Any) -> str:
-    """Return a value as JSON that cannot end the element of HTML around it."""
+    """Return a value as JSON that cannot end the HTML element in which it is written."""
     text = json.dumps(value, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
     for character, escape in _ESCAPES.items():
         text = text.replace(character, escape)

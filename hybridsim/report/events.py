@@ -19,7 +19,7 @@ _COLUMNS = 4096  # more than the page has pixels across
 
 
 def events_of(solution: Solution) -> dict[str, Any]:
-    """Return the events of a run for the page, or the first and last ones of very many."""
+    """Return the events of a run for the page, or only the first and last events if there are very many."""
     events = solution.events
     half = MOST_EVENTS // 2
     shown = list(range(len(events)))
@@ -54,7 +54,7 @@ def _long_text(kind: str, component: str, guard: str, source: str, target: str) 
 
 
 def _states(solution: Solution, events: list[Event]) -> list[dict[str, Any]] | None:
-    """Return each state just before and just after the events; the latter is None if it never differs."""
+    """Return each state just before and after the events; the second is None if no event changes the state."""
     if not events or not solution.names:
         return None
     before = np.array([event.x_minus for event in events]).T
@@ -69,7 +69,7 @@ def _states(solution: Solution, events: list[Event]) -> list[dict[str, Any]] | N
 
 
 def _explained(numbers: list[int], shown: list[int]) -> list[int]:
-    """Return which events are explained: the first ones, and the first one of each kind of change."""
+    """Return the numbers of the explained events: the first events, and the first event of each kind of change."""
     firsts: dict[int, int] = {}
     for number, k in zip(numbers, shown, strict=True):
         firsts.setdefault(number, k)
@@ -90,7 +90,7 @@ def _reasons(solution: Solution, chosen: list[int]) -> dict[str, str]:
 
 
 def modes_of(solution: Solution) -> list[dict[str, Any]]:
-    """Return for each component its modes with their colours, and the intervals of time or columns of them."""
+    """Return for each component its modes with their colours, and the time intervals of the modes or columns."""
     colours = mode_colours(solution.components)
     held = {c.name: c.surface.hold for c in solution.components if getattr(c, "surface", None)}
     intervals = solution.modes
@@ -119,7 +119,7 @@ def modes_of(solution: Solution) -> list[dict[str, Any]]:
 
 
 def in_columns(ends: np.ndarray, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return fewer intervals: starts and modes of equal columns, each divided among the modes that occur in it.
+    """Return fewer intervals: equal columns, each of which is divided among the modes that occur in the column.
 
     ends (m, 2), numbers (m,) : the ends and modes of all intervals, ascending.
     """

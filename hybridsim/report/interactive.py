@@ -99,7 +99,7 @@ def _strip(k: int, component: Mapping[str, Any]) -> str:
 
 
 def planes(data: Mapping[str, Any]) -> str:
-    """Return the phase plot and the friction loop of each contact, or nothing without two quantities."""
+    """Return the phase plot and the friction loop of each contact, or nothing for fewer than two quantities."""
     quantities = data["curves"]["quantities"] if data["curves"] else []
     if len(quantities) < 2:
         return ""

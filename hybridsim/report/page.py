@@ -54,7 +54,7 @@ _NO_SCRIPT = "<noscript><p>The curves and the events of this page need JavaScrip
 
 
 def write_report(solution: Solution, path: str | PathLike[str]) -> Path:
-    """Write the report of a run to a file; the arguments are those of `Solution.report`."""
+    """Write the report of a run to a file; `Solution.report` describes the arguments."""
     refuse_arrays(solution)
     path = Path(path_text(path))
     if path.suffix.lower() != SUFFIX:
@@ -111,7 +111,7 @@ def data_of(solution: Solution, size: int) -> dict[str, Any]:
 
 
 def _hash_of(script: str) -> str:
-    """Return the hash by which the page allows its own script, and no other."""
+    """Return the hash with which the page allows its own script and no other script."""
     return "sha256-" + b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii")
 
 

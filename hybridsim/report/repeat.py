@@ -1,4 +1,4 @@
-"""This module writes how to do a run again: a call in Python, and a command line."""
+"""This module writes the ways to repeat a run: a call in Python, and a command line."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Settings:
         }
 
     def _compare(self, model: Model) -> bool:
-        """Return whether the model is a packaged one with other values, and store the other parameters."""
+        """Return whether the model is a packaged model with other values, and store the other parameters."""
         if self.text is None or model.name not in {info.name for info in list_models()}:
             return False
         packaged = load(model.name)
@@ -61,7 +61,7 @@ class Settings:
         return True
 
     def _start_values(self) -> dict[str, float]:
-        """Return the start values of the run that differ from those of the named model."""
+        """Return the start values of the run that differ from the start values of the named model."""
         model = load(self.name) if self.is_packaged else self._solution.model
         if self.is_packaged and self.params:
             model = model.with_(**self.params)
@@ -71,7 +71,7 @@ class Settings:
         return {name: value for name, value in actual.items() if name in usual and value != usual[name]}
 
     def _choices(self) -> dict[str, Any]:
-        """Return integrator, options, tolerances and step sizes; the options are arguments of their own."""
+        """Return integrator, options, tolerances and step sizes; each option is a separate argument."""
         run, method = self._run, self._run.method
         tolerances = run.task.tolerances
         found: dict[str, Any] = {"integrator": "auto" if run.reason else method.name}

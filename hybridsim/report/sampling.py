@@ -33,7 +33,7 @@ class Sampler:
         self._sizes = self._estimated_sizes()
 
     def values(self, times: Array, is_after: bool = True) -> Array:
-        """Return the values (n, k) at times (k,); at an event those just after it, or just before it."""
+        """Return the values (n, k) at times (k,); at an event, the values just after or just before the event."""
         with np.errstate(all="ignore"):
             return self._trajectory.values_of(self.names, times, self._after if is_after else self._before)
 

@@ -1,4 +1,4 @@
-"""This module writes the parts of a report that need no script: summary, drawing, cost, model, and how to repeat it."""
+"""This module writes the parts of a report that need no script: summary, drawing, cost, model and settings."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ _COSTS = {
 
 
 def head(solution: Solution) -> str:
-    """Return the title, the state of the run, and the texts of the model about itself."""
+    """Return the title, the status of the run, and the descriptions that the model contains."""
     model: Model = solution.model
     mark, state = ("✔", "good") if solution.success else ("✘", "bad")
     texts = [model.description, model.look, model.source and f"Source: {model.source}"]
@@ -134,7 +134,7 @@ def _lines(model: Model) -> Iterator[str]:
 
 
 def repeated(settings: Settings) -> str:
-    """Return how to repeat the run, in Python and on the command line, with the file of the model if it needs one."""
+    """Return the ways to repeat the run in Python and on the command line, with a model file if one is needed."""
     parts = ['<section aria-labelledby="h-again"><h2 id="h-again">Repeat this run</h2>']
     if settings.text is not None and not settings.is_packaged:
         name = f"{settings.name}.toml"

@@ -69,7 +69,7 @@ class CurrentState(Readable):
 
     @property
     def ended(self) -> str:
-        """The reason why the run has ended, such as a monitor; empty while it can continue."""
+        """The reason why the run has ended, such as a monitor; empty while the run can continue."""
         return self._current.ended
 
     @property

@@ -31,7 +31,7 @@ from hybridsim.solution.run import Run
 
 @dataclass(frozen=True)
 class Position:
-    """The state of a simulator between two calls. It never changes; a call makes a new one.
+    """The state of a simulator between two calls. It never changes; a call makes a new state.
 
     Parameters
     ----------
@@ -168,7 +168,7 @@ def _follow(
     go: Callable[[Task], Trajectory],
     commit: Callable[[Position], None],
 ) -> None:
-    """Carry out a task, and pass the position at its end to `commit`; after an error, at the last event."""
+    """Carry out a task, and pass the position at its end, or after an error at the last event, to `commit`."""
     record = task.record
     try:
         record = go(task)

@@ -1,4 +1,4 @@
-"""This module defines the dicts that a simulator returns, which refuse assignments and say what to do instead."""
+"""This module defines the read-only dicts that a simulator returns; the errors of assignments name a remedy."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ Value = TypeVar("Value")
 
 
 class ReadOnly(dict[str, Value]):
-    """A dict that cannot be changed; a copy of it is an ordinary dict.
+    """A dict that cannot be changed; copies of this dict are ordinary dicts.
 
     Parameters
     ----------

@@ -68,7 +68,8 @@ def require_fit(saved: SavedState, model: Model, about: str) -> None:
     if not fits or about != saved.about:
         what = f"other settings, {saved.about}" if fits else f"another model, {own.name}"
         raise UsageError(
-            f"`saved` belongs to {what}", remedy="restore it in a simulator like the one that saved it"
+            f"`saved` belongs to {what}",
+            remedy="restore the saved state in a simulator like the one that saved it",
         )
 
 

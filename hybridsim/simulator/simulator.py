@@ -317,7 +317,7 @@ class Simulator(CurrentState):
 
     @refusing
     def restore(self, saved: SavedState) -> None:
-        """Restore a saved state of this simulator, or of another one with the same model.
+        """Restore a saved state of this simulator, or of another simulator with the same model.
 
         Parameters
         ----------

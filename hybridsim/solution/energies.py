@@ -56,7 +56,7 @@ class Energies(EventsAndModes):
         if not quantities:
             raise UsageError(
                 "integral() has no quantity",
-                remedy='use the name of one, or of several: sol.integral("f", "v")',
+                remedy='use the names of one or several quantities: sol.integral("f", "v")',
             )
         for name in quantities:
             if name != TIME:
@@ -142,7 +142,8 @@ class Energies(EventsAndModes):
         if not hasattr(self.model, "M"):
             raise UsageError(
                 f"{self.model.name} does not declare masses, so that its stored energy is unknown",
-                remedy="declare the energy as an output, hs.Output('E', 'm*v**2/2 + k*x**2/2'), and read sol['E']",
+                remedy="declare the energy as an output, hs.Output('E', 'm*v**2/2 + k*x**2/2'), and "
+                "read sol['E']",
             )
         requested = self.t if t is None else t
         times, side = self._within(as_times(requested), "+")
@@ -160,5 +161,7 @@ class Energies(EventsAndModes):
 
     def _measured(self, name: str, value: Any, where: str) -> Any:
         if value is None:
-            raise AttributeError(f"this Solution has no {name}: only a run of {where} has it", name=name)
+            raise AttributeError(
+                f"this Solution has no {name}: only a run of {where} has this result", name=name
+            )
         return value

@@ -81,5 +81,5 @@ class EventsAndModes(States):
         if self._save == "nothing":
             raise UsageError(
                 "the run was made with keep='nothing', which keeps no events and no modes",
-                remedy="simulate it with keep='events', or 'last-period'",
+                remedy="repeat the run with keep='events', or 'last-period'",
             )

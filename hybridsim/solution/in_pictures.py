@@ -93,7 +93,7 @@ class InPictures(InTables):
 
     @refusing
     def report(self, path: str | PathLike[str]) -> Path:
-        """Write the run as one HTML page: curves, modes, events with their reasons, cost, and how to repeat it.
+        """Write the run as one HTML page: curves, modes, events with reasons, cost, and instructions to repeat the run.
 
         The page needs no other file and no connection. It stays below 5 MB: of a very long run it has the whole curves
         of the first and last part, and the range of each quantity in short intervals between them.

@@ -113,7 +113,7 @@ class ModelTrajectory(ModelEvents):
     def by_segment(
         self, times: np.ndarray, side: str
     ) -> tuple[np.ndarray, list[tuple[Segment, np.ndarray, np.ndarray]]]:
-        """Return states (k, n) at given times, and for each segment the indices and local times of the times in it."""
+        """Return states (k, n) at given times, and for each segment the indices and local times of its given times."""
         index, s = self.segment_at(times, side)
         order = np.argsort(index, kind="stable")
         found, first = np.unique(index[order], return_index=True)
@@ -222,7 +222,7 @@ class ModelTrajectory(ModelEvents):
 
     @property
     def components(self) -> tuple[Component, ...]:
-        """Return the components of the model, including those added for jumps in its rates."""
+        """Return the components of the model, including components that were added for jumps in its rates."""
         return tuple(self.system.model.all_components()[: len(self.system.declared)])
 
     @cached_property

@@ -58,7 +58,7 @@ class _Way:
         return None
 
     def _zero(self, divisor: Denominator, number: int, first: int, last: int) -> tuple[float, float]:
-        """Return the last time before a sign change between two steps, and the step length there."""
+        """Return the last time before a sign change between two steps, and the length of the step."""
         segment = self.segments[number]
         sign = self.sign(divisor, number, float(segment.s[first]), segment.x[first])
         while last - first > 1:
@@ -94,7 +94,7 @@ class _Way:
 
 
 def end_at_pole(system: System, trajectory: Trajectory) -> None:
-    """End a run at a zero of a denominator, if the rates are not continuous there."""
+    """End a run at a zero of a denominator, if the rates are not continuous at this zero."""
     every = denominators(system.model)
     if not every or not trajectory.segments or system.n == 0:
         return

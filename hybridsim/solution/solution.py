@@ -110,7 +110,7 @@ class Solution(InPictures):
 
     @property
     def status(self) -> str:
-        """How the run ended: "finished" at t1, "terminated" by a monitor or schedule, or why it stopped."""
+        """How the run ended: "finished" at t1, "terminated" by a monitor or schedule, or the reason why it stopped."""
         return self._trajectory.status
 
     @property

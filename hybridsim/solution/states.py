@@ -142,7 +142,7 @@ class States:
         if self._save in ("events", "nothing"):
             raise UsageError(
                 f"the run was made with keep={self._save!r}, which keeps no states between start and end",
-                remedy="simulate it with keep='all', or store the end of it with keep='last-period'",
+                remedy="repeat the run with keep='all', or store the end of the run with keep='last-period'",
             )
         if (outside := self._outside(times)) is not None:
             bad, (low, high) = times[outside][0], sorted((self.t_start, self.t_end))

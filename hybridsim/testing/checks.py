@@ -50,7 +50,7 @@ def exact_stick(component: str, held: Mapping[str, float], rest: tuple[str, ...]
 
 
 def amplitude(name: str, t0: float, t1: float) -> Callable[[Any], float]:
-    """Return a function that computes (max - min)/2 on [t0, t1] from the values at events and ends."""
+    """Return a function that computes (max - min)/2 on [t0, t1] from the values at the events and at both ends."""
 
     def quantity(solution: Any) -> float:
         row = [state.name for state in solution.model.states].index(name)
@@ -68,7 +68,7 @@ def no_transition(solution: Any) -> list[str]:
 
 
 def equals(t: float, **values: float) -> Check:
-    """Return a check that quantities have an exact value at a time, just after any event at this time."""
+    """Return a check that quantities have given values at a time; events at this time are applied first."""
 
     def check(solution: Any) -> list[str]:
         found = {name: float(solution.output(name, t)) for name in values}

@@ -1,4 +1,4 @@
-"""Limits on the processor time of a run; unlike wall time, it is not affected by other processes."""
+"""Limits on the processor time of a run. Unlike wall time, processor time is not affected by other processes."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def _giving_up(message: str) -> Callable[[int, FrameType | None], None]:
 
 
 def _is_passed_over(frame: FrameType | None) -> bool:
-    """Return whether Python would ignore an exception raised in a frame, as in finalisers."""
+    """Return whether Python would ignore an exception that is raised in a frame, as it does in finalisers."""
     codes = [getattr(function, "__code__", None) for function in gc.callbacks]
     files = (weakref.__file__, _weakrefset.__file__)
     while frame is not None:

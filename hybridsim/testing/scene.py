@@ -133,5 +133,5 @@ class Scene:
 
 
 def named(name: str, span: tuple[float, float], truth: Truth, *rest: Any, **more: Any) -> Scene:
-    """Return a scene with the name of its model file; the other arguments are those of `Scene`."""
+    """Return a scene with the name of its model file; other arguments are passed on to `Scene`."""
     return Scene(name, name, span, truth, *rest, **more)

@@ -171,7 +171,7 @@ def carry_out(
 
 
 def cut_short(tolerances: tuple[float, float], last: Setting) -> tuple[float, float]:
-    """Return the allowed errors of a study whose last setting is the given one."""
+    """Return the allowed errors of a study whose last setting is the given setting."""
     allowed = CUT_SHORT * last.options.get("rtol", 0.0)
     return max(tolerances[0], allowed), max(tolerances[1], allowed)
 

@@ -74,7 +74,7 @@ def one_line(text: str) -> str:
 
 
 def order(done: tuple[tuple[Setting, Measured], ...]) -> float | None:
-    """Return the observed order of convergence at the two finest settings, or None if it is not visible."""
+    """Return the observed order of convergence at the two finest settings, or None if the order is not visible."""
     if len(done) < 2 or "rtol" in done[-1][0].options:
         return None
     (before, coarse), (setting, fine) = done[-2:]

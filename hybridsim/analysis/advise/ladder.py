@@ -62,7 +62,7 @@ class Step:
 
 
 def relative_error(value: Number, full: Number) -> float:
-    """Return |value - full|/|full|; if the full value is zero, 0 for a zero value and inf otherwise."""
+    """Return |value - full|/|full|. If the full value is zero, return 0 for a zero value and infinity otherwise."""
     if full == 0:
         return 0.0 if value == 0 else math.inf
     return abs(value - full) / abs(full)
@@ -131,7 +131,7 @@ def climb(
     tol: float,
     limits: Limits,
 ) -> Iterator[Step]:
-    """Yield the result of each simplified model, from the simplest one up."""
+    """Yield the result of each simplified model, beginning with the simplest model."""
     for rung in ladder_steps:
         if limits.budget.left:
             yield _step(rung, scene, question, full, tol, limits)

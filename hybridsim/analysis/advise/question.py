@@ -53,7 +53,7 @@ class OverRun(Measures):
         self.solution = solution
 
     def _extreme(self, name: str, side: int) -> float:
-        """Return the least or greatest value of one quantity, without searching all other quantities."""
+        """Return the least or greatest value of one quantity, without a search over all other quantities."""
         if name not in self._alone:
             orbit = self._orbit
             q = slice(orbit.column(name), orbit.column(name) + 1)
@@ -68,7 +68,7 @@ class OverRun(Measures):
 
 @dataclass(frozen=True)
 class Answer:
-    """The value of the quantity, the seconds it took to find the motion, and the motion."""
+    """The value of the quantity, the motion, and the seconds that were needed to find the motion."""
 
     value: Number
     seconds: float

@@ -80,7 +80,7 @@ class Setting:
 
 @dataclass(frozen=True)
 class _Settling:
-    """A run that is long enough to become steady, and the interval at its end that is measured."""
+    """A run that is long enough to become steady, with the measured interval at the end of the run."""
 
     question: Question
     span: tuple[float, float]
@@ -145,7 +145,7 @@ def settings(
 
 
 def rank(setting: Setting) -> tuple[bool, bool, float]:
-    """Return the sort key: adequate settings come first, then fast ones. The time of fixed steps gets a handicap."""
+    """Return the sort key: adequate settings come first, then fast settings; the times of fixed steps are increased."""
     worth = _UNCONTROLLED if "step" in setting.options else 1.0
     return not setting.is_adequate, math.isnan(setting.seconds), worth * setting.seconds
 

@@ -30,7 +30,7 @@ class Spread:
 
 
 def ranges_of(model: Model, declared_ranges: Any) -> dict[str, tuple[float, float]]:
-    """Return the checked ranges by parameter; each must contain the model's own value."""
+    """Return the checked ranges by parameter; each range must contain the model's own value."""
     if not isinstance(declared_ranges, Mapping) or not declared_ranges:
         raise cannot_be(
             "uncertain",

@@ -111,7 +111,7 @@ class Comparison(Readable):
         )
 
     def floor(self, quantity: str) -> float:
-        """Return the uncertainty of the reference in the units of `reading`; 0 if it is unknown."""
+        """Return the uncertainty of the reference in the units of `reading`, or 0 if the uncertainty is unknown."""
         return self.scaled(self.uncertainty, quantity) or 0.0
 
     def scaled(self, errors: Errors | None, quantity: str) -> float | None:
@@ -174,7 +174,7 @@ class Comparison(Readable):
         return [self._record(row) for row in self.rows]
 
     def to_json(self, path: str | Path | None = None) -> str:
-        """Return all results as JSON text, with versions, machine and model hash; write it if a path is given."""
+        """Return all results as JSON text, with versions, machine and model hash. With a path, also write the text."""
         return json_record(self.to_dict(), path)
 
     def _record(self, row: Row) -> dict[str, Any]:

@@ -86,7 +86,7 @@ def _row(values: Any, what: str, remedy: str = "use a list of numbers") -> Any:
 def run_span(
     t_span: tuple[float, float] | None, duration: float | None, period: float | None
 ) -> tuple[float, float]:
-    """Return the interval of the runs; by default the duration, else some periods of the forcing, else a fixed time."""
+    """Return the time span of the runs; the default is the duration, else some forcing periods, else a fixed time."""
     if t_span is None:
         if duration is not None:
             return 0.0, duration

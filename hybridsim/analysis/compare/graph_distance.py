@@ -151,7 +151,7 @@ def _farthest(one: CompletedGraph, other: CompletedGraph, end: float) -> float:
 
 
 def _nearest_gap(times: Array, others: Array) -> Array:
-    """Return the distance of each of `times` from the nearest time in `others`, or 0 if there is none."""
+    """Return the distance of each of `times` from the nearest time in `others`, or 0 if `others` is empty."""
     if not len(others):
         return np.zeros(len(times))
     after = np.clip(np.searchsorted(others, times), 0, len(others) - 1)

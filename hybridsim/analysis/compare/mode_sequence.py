@@ -1,4 +1,4 @@
-"""This module matches the events of a run with those of a reference, and compares the two mode sequences."""
+"""This module matches the events of a run with the events of a reference, and compares the two mode sequences."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _MISSED, _MATCHED, _SPURIOUS = 0, 1, 2
 
 @dataclass(frozen=True)
 class SequenceVerdict:
-    """The counted differences between the mode sequence of a run and that of the reference."""
+    """The counted differences between the mode sequences of a run and of the reference."""
 
     missed: int = 0
     spurious: int = 0
@@ -52,7 +52,7 @@ class _Entry:
 
 
 def match_events(reference: Trajectory, run: Trajectory) -> MatchedEvents:
-    """Match the events of a run with those of the reference, for each component, monitor and schedule.
+    """Match the events of a run with the events of the reference, for each component, monitor and schedule.
 
     The sequences of different components are matched separately, because the order of independent events may
     differ by rounding. Matched events are at most half of the longest event-free interval apart; beyond that
@@ -128,7 +128,7 @@ def _without_instants(entries: Sequence[_Entry]) -> list[_Entry]:
 
 
 def _align(expected: Sequence[_Entry], found: Sequence[_Entry], window: float) -> list[tuple[int, int]]:
-    """Return the index pairs of the cheapest alignment in order; only entries within the time window match.
+    """Return the index pairs of the cheapest alignment, in order; only entries within the time window match.
 
     This is the edit distance, row by row over the expected entries and, in each row, over the found entries
     within the window only. The work therefore grows linearly with the number of events.

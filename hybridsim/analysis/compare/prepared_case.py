@@ -41,7 +41,7 @@ class PreparedCase:
         return simulate(model or self.model, self.t_span, integrator=integrator, **options)
 
     def call(self, line: Series, value: float) -> Callable[[], Solution]:
-        """Return a function, for timing, that makes one run of a line at one setting."""
+        """Return a function that makes one run of a line at one setting, so that the run can be timed."""
         model, options = self._form(line, value), line.options_at(value)
         return lambda: self.simulate(line.integrator, model=model, **options)
 

@@ -113,7 +113,7 @@ def timed_rows(
 
 
 def _predicted(entries: Sequence[Entry], rows: dict[_Run, Row], run: _Run) -> float:
-    """Return the predicted seconds of a run, from two looser settings of its line; 0 if unknown."""
+    """Return the seconds of a run, predicted from two looser settings of its line, or 0 without a prediction."""
     before = [rows[replace(run, level=level)] for level in range(run.level)]
     done = [(row.setting[1], row.cost) for row in before if row.cost is not None]
     if any(row.status == STOPPED for row in before):

@@ -81,7 +81,7 @@ def _warmed_up(run: Callable[[], object], expected: float, until: float) -> floa
 
 
 def _fitting(expected: Sequence[float], seconds: float) -> list[int]:
-    """Return the indices of the runs that fit into the remaining seconds, chosen from the shortest."""
+    """Return the indices of the runs that fit into the remaining seconds; shorter runs are chosen first."""
     chosen, left = [], seconds
     for i in sorted(range(len(expected)), key=lambda i: expected[i]):
         if expected[i] > left:

@@ -117,8 +117,8 @@ def continuation(
     if not low <= value <= high or low == high:
         raise UsageError(
             f"`bounds` {bounds!r} do not contain the model's value {parameter} = {value:g}",
-            remedy="use bounds that contain it, or change the model's value with "
-            f"params={{{parameter!r}: ...}}",
+            remedy="use bounds that contain the model's value, or change this value with "
+            "params={{parameter!r}: ...}",
         )
     method = {"integrator": integrator, "rtol": rtol, **options}
     start = steady_state(model, x0=x0, **method)

@@ -24,7 +24,7 @@ def doubts(
     *,
     is_stated: bool,
 ) -> tuple[str, ...]:
-    """Return warnings about values at bounds, unexplained data, correlated residuals and a wrong noise.
+    """Return warnings about values at bounds, unexplained data, correlated residuals and wrong noise levels.
 
     off : (m,), measured minus simulated samples.
     is_stated : whether the noise was given and not estimated.

@@ -163,7 +163,7 @@ def _noise_of(noise: Any, residuals: Residuals) -> dict[str, float] | None:
     for name in noise:
         if name not in residuals.names:
             raise UsageError(
-                f"`noise` contains {name!r}, which no record has",
+                f"`noise` contains {name!r}, but no record contains {name!r}",
                 remedy=nearest(str(name), residuals.names, kind="quantities"),
             )
     missing = [name for name in residuals.names if name not in noise]

@@ -36,7 +36,7 @@ class Undetermined:
 def undetermined(
     names: list[str], slopes: np.ndarray, per_value: np.ndarray
 ) -> tuple[list[Undetermined], np.ndarray]:
-    """Return the undetermined combinations, and the covariance (n, n) that remains without them, in units of sizes.
+    """Return the undetermined combinations, and the scaled covariance (n, n) after their removal.
 
     A combination is undetermined if its derivative is zero within the errors of difference quotients, or if its
     standard deviation is far above the sizes of the unknowns.

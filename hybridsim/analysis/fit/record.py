@@ -83,7 +83,7 @@ class Record:
             if len(values) != len(t):
                 raise UsageError(
                     f"column {name!r} has {len(values)} values, but there are {len(t)} times",
-                    remedy="use one value for each time, and NaN for a missing one",
+                    remedy="use one value for each time, and NaN for a missing value",
                 )
             if np.isinf(values).any():
                 raise UsageError(
@@ -123,7 +123,8 @@ def refuse_unknowns_of_records(records: tuple[Record, ...], unknowns: Iterable[s
             if name in record.params or name in map(start_of, record.x0):
                 raise UsageError(
                     f"a record sets {name}, which is also one of the `unknowns`",
-                    remedy="leave it out of one of them; all records share the unknowns",
+                    remedy=f"remove {name} from the record or from the `unknowns`; all records share the "
+                    "unknowns",
                 )
 
 
@@ -166,6 +167,6 @@ def _numbers(column: Any, name: str) -> np.ndarray:
     if None in values:
         raise UsageError(
             f"column {name!r} contains a value that is not a number",
-            remedy="use numbers, and NaN for missing ones",
+            remedy="use numbers, and NaN for missing numbers",
         )
     return np.array(values, dtype=float)

@@ -92,7 +92,7 @@ class Residuals:
         )
 
     def predicted(self, coordinates: np.ndarray) -> np.ndarray:
-        """Return the simulated value (m,) of each sample; NaN after the end of a run that stopped early."""
+        """Return the simulated value (m,) of each sample, or NaN after the end of a run that stopped early."""
         values = self.values(coordinates)
         runs = [self.solution(record, values) for record in self.records]
         self._latest = coordinates.tobytes(), runs
@@ -195,7 +195,7 @@ class Residuals:
 
 
 def _central(one_sided: list[np.ndarray], is_coarse: bool) -> np.ndarray:
-    """Return the mean of the derivatives on two sides, or the smaller one if fine derivatives differ grossly."""
+    """Return the mean of the one-sided derivatives, or the smaller one if fine steps give very different values."""
     one_sided = [each for each in one_sided if np.isfinite(each).all()] or [
         np.full_like(one_sided[0], np.nan)
     ]

@@ -1,4 +1,4 @@
-"""This package holds the simplified models of `advise`, and states what each of them leaves out."""
+"""This package holds the simplified models of `advise`, each with a statement of the features that it leaves out."""
 
 from __future__ import annotations
 

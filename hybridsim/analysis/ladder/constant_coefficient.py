@@ -31,7 +31,7 @@ class ConstantAtRest(LadderStep):
     drops = "how friction changes with speed: the law's force at v = 0 is used"
 
     def apply(self, scene: Scene) -> Model:
-        """Return the model with Coulomb friction whose force is that of slow sliding."""
+        """Return the model with Coulomb friction whose force equals the force of slow sliding."""
         model = scene.model
         _need_velocity_law(model)
         return with_contacts(model, lambda c: _constant(c, "0"), "constant mu (at rest)")

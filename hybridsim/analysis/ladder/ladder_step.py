@@ -1,4 +1,4 @@
-"""This module defines a simplified model: what it leaves out, and when it does not apply."""
+"""This module defines the base class of simplified models, which leave out one feature of a model."""
 
 from __future__ import annotations
 

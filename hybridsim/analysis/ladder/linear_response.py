@@ -73,7 +73,7 @@ def _wave(row: Affine, frequency: float, inputs: Mapping[str, complex]) -> compl
 
 
 def _mean(row: Affine, inputs: Iterable[Input], values: Mapping[str, float]) -> float:
-    """Return the mean over a period of the forcing terms in one rate, without the states."""
+    """Return the mean of the forcing terms in one rate over a period, without the terms of the states."""
     total = row.constant
     for declared in inputs:
         number = {name: float(evaluate(e, values)) for name, e in declared.expressions.items()}

@@ -19,7 +19,7 @@ class _Regularised(LadderStep):
         if v0 is None:
             if not scene.peak:
                 raise DoesNotApply(
-                    "nothing slides in the full motion, so there is no sliding speed to choose `v0` from"
+                    "nothing slides in the full motion, so there is no sliding speed for the choice of `v0`"
                 )
             v0 = SHARE * scene.peak
         try:

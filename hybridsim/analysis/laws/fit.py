@@ -1,4 +1,4 @@
-"""This module fits a piecewise linear function to noisy points by least squares, with knots of free position."""
+"""This module fits a piecewise linear function to noisy points by least squares, with free knots."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ class _Points:
         return self.optimised(best, _ROUGH)
 
     def optimised(self, inner: np.ndarray, tolerance: float) -> np.ndarray:
-        """Return the inner knots after optimisation; each stays between the middles of its neighbours."""
+        """Return the inner knots after optimisation; each knot stays between the midpoints to its neighbours."""
         middles = np.concatenate([self.ends[:1], 0.5 * (inner[1:] + inner[:-1]), self.ends[1:]])
         bounds, scale = (middles[:-1], middles[1:]), np.diff(middles)
         found = least_squares(

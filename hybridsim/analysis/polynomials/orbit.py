@@ -66,8 +66,8 @@ class Orbit:
         if name in self.too_fast:
             raise SimulationError(
                 f"{name} varies too fast, or jumps too often, to be measured over a period",
-                remedy="sample this quantity from steady.solution, and remove it from the model's outputs to "
-                "measure all others at once",
+                remedy="sample this quantity from steady.solution, and remove it from the model's "
+                "outputs to measure the other quantities",
             )
         return self.names.index(name)
 
@@ -132,7 +132,7 @@ class Orbit:
         return Turns(q, k, times, turned, before < 0.0)
 
     def _blocks(self) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
-        """Yield batches of pieces: numbers, Legendre coefficients (k * Q, POINTS), validity masks (k, Q)."""
+        """Yield batches of pieces: their numbers, Legendre coefficients (k * Q, POINTS) and validity masks (k, Q)."""
         block = max(1, _SLOPES_PER_BATCH // (_DENSE * len(self.names)))
         for first in range(0, max(len(self.values), 1), block):
             chosen = slice(first, first + block)

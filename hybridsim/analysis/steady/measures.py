@@ -261,7 +261,7 @@ class Measures:
 
 
 def word_of(solution: Solution) -> tuple[str, ...]:
-    """Return the mode sequence of a run; the last mode is dropped if it equals the first."""
+    """Return the mode sequence of a run, without the last mode if it equals the first mode."""
     names = [a.modes for a in solution._system.declared]
     found: list[str] = []
     for z, (first, last) in zip(solution._segments.modes(), solution._segments.spans(), strict=True):

@@ -102,7 +102,7 @@ class SteadyState(Readable, Measures):
 
     @cached_property
     def solution(self) -> Solution:  # type: ignore[override]  # computed on demand
-        """The run over one period; if the motion has no period, a run over part of it.
+        """The run over one period, or over a part of the motion if the motion has no period.
 
         With forcing it begins at t = 0, or between two events if an event is there, so that it contains each
         event once.

@@ -59,7 +59,7 @@ class Passings:
         return relative(self.values[-1] - self.values[-1 - multiple], self.scale)
 
     def repeats_after(self, tolerance: float) -> int | None:
-        """Return after how many passages the motion repeats, or None if the motion has not converged yet."""
+        """Return the number of passages after which the motion repeats, or None before the motion has converged."""
         found = (m for m in range(1, min(LONGEST_WORD, len(self.values) - 1) + 1))
         return next((m for m in found if self._error(m, CLOSER * tolerance) <= tolerance), None)
 
@@ -87,7 +87,7 @@ class Passings:
         return multiple * left / rate
 
     def _change(self, back: int, multiple: int) -> float:
-        """Return the change of the states over `multiple` passages, by default the last ones."""
+        """Return the change of the states over `multiple` passages, by default the last passages."""
         return relative(
             self.values[-1 - back * multiple] - self.values[-1 - (back + 1) * multiple], self.scale
         )

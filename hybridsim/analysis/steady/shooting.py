@@ -83,7 +83,7 @@ def shoot(motion: Motion, start: Orbit, scale: np.ndarray, section: int | None, 
 
 
 def followed_closely(motion: Motion, start: Orbit, scale: np.ndarray, is_free: bool) -> Orbit:
-    """Return an orbit recomputed at the tightest tolerance, with its period corrected if it is unknown.
+    """Return an orbit that is recomputed at the tightest tolerance; an unknown period is corrected too.
 
     Orbits in a continuum, as in a system that conserves energy, change only by the numerical loss of a run.
     """

@@ -243,7 +243,7 @@ class _Search:
         return replace(passings, scale=scale)
 
     def _over_a_period(self, start: Point) -> np.ndarray:
-        """Return the Jacobian of the period map, (n + d, n + d), or zeros if it is unknown."""
+        """Return the Jacobian of the period map, (n + d, n + d), or zeros if the Jacobian is unknown."""
         try:
             return derivatives(self.motion.run(start, self.period or 0.0), ()).by_start
         except UsageError:
@@ -436,7 +436,7 @@ def _check_period(model: Model, period: float, own: float | None) -> None:
 
 
 def _refuse_what_ends(system: System, has_period: bool) -> None:
-    """Reject models with impacts, and models with events or inputs that change them permanently."""
+    """Reject models with impacts, and models that events or inputs change permanently."""
     model = system.model
     if system.is_unilateral.any():
         raise UsageError(

@@ -31,7 +31,7 @@ class Effort(NamedTuple):
 
 
 def effort_of(options: Mapping[str, Any]) -> Effort | None:
-    """Return the settings of a search among the options of `steady_state`, or None if one is not valid."""
+    """Return the settings of a search among the options of `steady_state`, or None if a setting is not valid."""
     effort = Effort(**{name: options[name] for name in Effort._fields if name in options})
     counts = (effort.settle, effort.max_periods)
     is_valid = isinstance(effort.tol, float) and 0.0 < effort.tol < 1.0
@@ -68,7 +68,7 @@ def steady_motions(
 
 
 def settled(motion: Motion, effort: Effort) -> SteadyState | None:
-    """Return the steady motion of a model from its own start, or None if compiled code cannot decide it."""
+    """Return the steady motion of a model from its own start, or None if compiled code cannot find the motion."""
     system = system_of(motion.model)
     parameters = np.array([list(system.values.values())])
     starts = system.start_state({})[None, :]

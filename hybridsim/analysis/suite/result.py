@@ -179,7 +179,7 @@ class SuiteComparison(Readable):
         }
 
     def to_json(self, path: str | Path | None = None) -> str:
-        """Return all results as JSON text, with versions and machine; write it if a path is given."""
+        """Return all results as JSON text, with versions and machine. With a path, also write the text."""
         return json_record(self.to_dict(), path)
 
 

@@ -152,7 +152,7 @@ class _Describer:
 
 
 def _module(value: Any) -> str:
-    """Return the module of a class or function; some objects not written in Python have none."""
+    """Return the module of a class or function; some objects not written in Python have no module."""
     name = getattr(value, "__module__", None)
     return name if isinstance(name, str) else "builtins"
 

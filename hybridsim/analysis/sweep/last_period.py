@@ -76,7 +76,7 @@ class LastPeriod:
         alone: Callable[[Settings], Outcome],
         watch: Watch,
     ) -> Together | None:
-        """Run all points in compiled code, or return None; the function `alone` runs points that fail in it."""
+        """Run all points in compiled code, or return None; the function `alone` runs the points that fail."""
         from hybridsim.ensemble.group import Ensemble, can_run_together
         from hybridsim.ensemble.runs import last_periods
 

@@ -94,7 +94,7 @@ class Steady:
         return batch.finished()
 
     def blank(self, result: SteadyState) -> tuple[str, ...]:
-        """Return the values that a result does not have, such as the period of an equilibrium, as NaN."""
+        """Return NaN for the values that a result does not have, such as the period of an equilibrium."""
         return ("period",) if result.kind == "equilibrium" else ()
 
 

@@ -158,7 +158,7 @@ class Sweep(Readable):
         }
 
     def to_json(self, path: str | Path | None = None) -> str:
-        """Return all results as JSON text, with versions, machine and model hash; write it if a path is given."""
+        """Return all results as JSON text, with versions, machine and model hash. With a path, also write the text."""
         return json_record(self.to_dict(), path)
 
     def to_pandas(self) -> pd.DataFrame:

@@ -93,7 +93,7 @@ class Section:
 
 
 def sampling_period(model: Model) -> float:
-    """Return the period of the forcing, or raise `UsageError` if there is no single one."""
+    """Return the period of the forcing, or raise `UsageError` if there is no single period."""
     period = system_period(system_of(model))
     if period is None:
         raise UsageError(

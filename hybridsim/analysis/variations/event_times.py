@@ -82,7 +82,7 @@ class EventTimes:
     def recorded(
         self, segment: Segment, one: Occurrence, s: float, x: np.ndarray, Y: np.ndarray, Yd: np.ndarray
     ) -> np.ndarray:
-        """Return the derivatives (M,) of a recorded monitor's time; NaN if the monitor only touches zero."""
+        """Return the derivatives (M,) of a recorded monitor's time, or NaN if the monitor only touches zero."""
         shift = self._located(segment, one, s, x, Y, Yd, is_first=False)
         return np.full(self._changes.G.shape[1], np.nan) if shift is None else shift.values
 
@@ -96,7 +96,7 @@ class EventTimes:
         Yd: np.ndarray,
         is_first: bool,
     ) -> Shift | None:
-        """Return the derivatives of the time of an event, or None if another event caused it."""
+        """Return the derivatives of the time of an event, or None if another event caused the event."""
         system = self.system
         is_monitor = one.kind == "monitor"
         if is_monitor:

@@ -87,7 +87,7 @@ class FlowDerivatives:
         return np.concatenate(parts) if parts else np.zeros((0, n, n + len(self._moving)))
 
     def _beside(self, number: int, tape: TangentTape, s: float) -> np.ndarray:
-        """Return the derivatives (n, n + q) of the rates next to a local time at which they do not exist."""
+        """Return the derivatives (n, n + q) of the rates next to a local time at which the derivatives do not exist."""
         segment = self._segments[number]
         begin, end = float(segment.s[0]), float(segment.s[-1])
         near = np.array([s + _ISOLATED * (end - begin) * (1.0 if 2.0 * s < begin + end else -1.0)])
@@ -104,7 +104,7 @@ class FlowDerivatives:
     def over(
         self, number: int, Y: np.ndarray, Yd: np.ndarray, G: np.ndarray, stops: np.ndarray
     ) -> np.ndarray:
-        """Return the derivatives (k, n, M) at ascending local times (k,) of a segment from those at its start.
+        """Return the derivatives (k, n, M) at ascending local times (k,) of a segment from derivatives at its start.
 
         Y (n, M), Yd (d, M): derivatives of the states and discrete states. G (P, M): derivatives of the parameters.
         """

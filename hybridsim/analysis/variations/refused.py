@@ -18,7 +18,7 @@ def refuse(solution: Solution) -> None:
     if solution._save != "all":
         raise UsageError(
             f"the run was made with keep={solution._save!r}, but derivatives need all of the run",
-            remedy="simulate it with keep='all'",
+            remedy="repeat the run with keep='all'",
         )
     if solution.t_end <= solution.t_start:
         raise UsageError("`solution` does not run forward in time", remedy="use a run with t1 > t0")

@@ -46,7 +46,7 @@ def add_to(commands: Any) -> None:
 
 
 def execute(args: argparse.Namespace, session: Session) -> int:
-    """Print the automaton and the warnings of a model, which was checked when it was loaded."""
+    """Print the automaton and the warnings of a model. The model was checked when it was loaded."""
     from hybridsim.engine.run.report import describe
     from hybridsim.model.checks.doubtful import warnings_of
     from hybridsim.model.checks.starting_facts import starting_facts

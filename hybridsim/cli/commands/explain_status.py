@@ -1,4 +1,4 @@
-"""`hybridsim explain-status WORDS`: print what a status or a warning means, and what to do."""
+"""`hybridsim explain-status WORDS`: print the meaning of a status or a warning, and the remedy."""
 
 from __future__ import annotations
 

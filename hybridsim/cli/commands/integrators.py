@@ -30,7 +30,7 @@ def add_to(commands: Any) -> None:
 
 
 def execute(args: argparse.Namespace, session: Session) -> int:
-    """List all integrators, including those from plug-ins, or describe one of them with its options."""
+    """List all integrators, including those from plug-ins, or describe one integrator with its options."""
     from hybridsim.integrators import integrator_class, list_integrators
     from hybridsim.integrators.contract import CAPABILITIES
     from hybridsim.integrators.options import options_of

@@ -1,4 +1,4 @@
-"""`hybridsim resume FILE`: continue a saved run to its end time or to a later one."""
+"""`hybridsim resume FILE`: continue a saved run to its end time or to a later time."""
 
 from __future__ import annotations
 

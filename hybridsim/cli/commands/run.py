@@ -115,7 +115,7 @@ def simulated(
 
 
 def run_settings(args: argparse.Namespace) -> dict[str, Any]:
-    """Return the keyword arguments for `simulate` from the command line, without those that were omitted."""
+    """Return the keyword arguments for `simulate` from the command line, without omitted arguments."""
     settings: dict[str, Any] = {
         name: getattr(args, name) for name in ("rtol", "atol", "max_step") if getattr(args, name) is not None
     }

@@ -1,4 +1,4 @@
-"""Represent the monitors of a model as corners, so that compiled loops pass their zeros like those of other corners.
+"""Represent the monitors of a model as corners, so that compiled loops treat zeros of both alike.
 
 A corner of a monitor has two modes, ``+`` and ``-``, in which the monitor is positive and negative. The modes have the
 same rates. A zero of the monitor changes the mode and nothing else. The corners follow all other components, and their

@@ -113,7 +113,7 @@ class EventResolution(ClusterChoice):
         )
 
     def _past_corners(self, open_: set[int]) -> set[int]:
-        """Set corners to their sides; return the other components whose guards still fire after that.
+        """Set corners to their sides; return the other components whose guards still fire after this change.
 
         A zero that was located by a series past a corner, where the guard turns back, does not fire.
         """

@@ -55,7 +55,7 @@ class Atoms:
         self.known: list[Atom] = [Atom(TIME, 1.0, 0.0, ())]
 
     def number(self, atom: Atom) -> int:
-        """Return the number of a basic function of time; a new one gets the next number."""
+        """Return the number of a basic function of time; a new function gets the next number."""
         if atom not in self.known:
             self.known.append(atom)
         return self.known.index(atom)
@@ -232,7 +232,7 @@ def _sum(a: Form, b: Form, sign: float) -> Form:
 
 
 def _product(a: Form, b: Form) -> Form:
-    """Return the product of two linear forms if it is a linear form, or raise NotLinear."""
+    """Return the product of two linear forms if the product is a linear form, or raise NotLinear."""
     result: Form = {}
     for left, u in a.items():
         for right, v in b.items():

@@ -132,7 +132,7 @@ _put = Precompiled(put_entries)
 
 
 def _factors(monomials: Sequence[Sequence[int]], one: int) -> np.ndarray:
-    """Return the factors of each monomial, padded with ones to equal length."""
+    """Return the factors of each monomial, padded with factors 1 to equal length."""
     factors = np.full((len(monomials), max(map(len, monomials))), one, dtype=np.int64)
     for row, monomial in zip(factors, monomials, strict=True):
         row[: len(monomial)] = monomial

@@ -241,7 +241,7 @@ def _combined(clusters: list[_Cluster], values: np.ndarray) -> list[_Cluster]:
 
 
 def _block(A: np.ndarray, cluster: _Cluster, values: np.ndarray, partners: list[int]) -> _Block:
-    """Return the triangular block of a cluster, or an empty block if it cannot be separated."""
+    """Return the triangular block of a cluster, or an empty block if the cluster cannot be separated."""
     from scipy.linalg import rsf2csf, schur
 
     members = list(cluster.members)

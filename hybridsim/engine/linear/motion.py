@@ -41,7 +41,7 @@ _BACK, _BACKWARD = 1.0 / FARTHEST, 4.0
 
 @inlined
 def size_of(z: complex) -> float:
-    """Return an upper bound of a complex modulus, at most 1.5 times too large, without a square root."""
+    """Return an upper bound of a complex modulus without a square root; the bound is at most 1.5 times too large."""
     return abs(z.real) + abs(z.imag)
 
 

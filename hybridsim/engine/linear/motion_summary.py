@@ -143,7 +143,7 @@ def sum_up(
     lin: Any, hold: Any, record: Any, first: int, last: int, begin: float, nodes: Any, weights: Any, scratch: Any,
     out: Any,
 ) -> bool:  # fmt: skip
-    """Add segments of a record to a `MotionSummary`; the first one counts from local time `begin` on.
+    """Add segments of a record to a `MotionSummary`; the first segment counts from local time `begin` on.
 
     record: ends, rows, modes, coordinates, jumps as written by `hybridsim.integrators.closed_form.segments`;
     hold: holding mode of each component. scratch: v (J,); slopes and bounds of third derivatives (3, n). Return

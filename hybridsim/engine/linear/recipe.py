@@ -131,7 +131,7 @@ class Recipe:
         self._left, self._right, self._found = compared[:, 0], compared[:, 1], compared[:, 2] != 0
 
     def values(self, inputs: Any) -> np.ndarray | None:
-        """Return all registers for the given inputs, or None if a comparison differs from the recorded one."""
+        """Return all registers for the given inputs, or None if a comparison differs from the recorded comparison."""
         V = self._start.copy()
         V[: self._inputs, 0] = inputs
         _advance(self._rows, V, 0)

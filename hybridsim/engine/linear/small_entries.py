@@ -14,7 +14,7 @@ _CLOSE = 1e-14  # largest change of a row relative to the largest row; a larger 
 
 
 def with_small_rows(A: np.ndarray, V: np.ndarray, T: np.ndarray) -> np.ndarray:
-    """Correct the small rows of V in A V = V T, because rounding errors are large relative to them."""
+    """Correct the small rows of V in A V = V T, because rounding errors are large relative to these rows."""
     V, sizes = V.astype(complex), np.abs(V).max(axis=1, initial=0.0)
     largest = sizes.max(initial=0.0)
     small = sizes < _SMALL * largest
@@ -33,7 +33,7 @@ def with_small_rows(A: np.ndarray, V: np.ndarray, T: np.ndarray) -> np.ndarray:
 
 
 def _solved(A: np.ndarray, T: np.ndarray, known: np.ndarray) -> np.ndarray:
-    """Return the solution X of A X - X T = -known, or NaN if there is none."""
+    """Return the solution X of A X - X T = -known, or NaN if there is no solution."""
     from scipy.linalg import solve_sylvester
 
     try:

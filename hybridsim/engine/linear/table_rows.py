@@ -70,7 +70,7 @@ def write_bases(A: Any, n: int, flows: Any, inverse: Any, states: Any, spreads: 
 
 @kernel
 def write_lengths(flows: Any, lasting: Any, near: Any) -> None:
-    """Write, for each mode, how long its closed form from one point is accurate, and the length of a short time.
+    """Write for each mode the time over which its closed form is accurate, and the length of a short time.
 
     It is accurate until numbers overflow or blocks lose accuracy. Coordinates of one block have errors relative to the
     largest of them. If one grows faster than the others, such as a load that is still very small, the rounding error

@@ -63,7 +63,7 @@ def numbered(values: Iterable[Any]) -> Rows:
 
 
 def slopes_and_growth(lowering: Lowering, force: Force, count: int) -> Iterator[Any]:
-    """Return d(u_k)/dx and d(rates)/d(unknown_k), then the derivatives of friction forces by the loads of others.
+    """Return d(u_k)/dx and d(rates)/d(unknown_k), then the derivatives of friction forces by normal forces.
 
     force : a friction force by component, surface and number, from 0 to `count`.
     """

@@ -117,7 +117,7 @@ class LoweringState:
         return many if plural else one
 
     def written(self, c: int) -> str:
-        """Return the function of a surface as it was declared."""
+        """Return the declared text of the function of a surface."""
         return " ".join(str(self.components[c].surface.function.text).split())
 
     def place(self, c: int) -> Place | None:

@@ -127,7 +127,7 @@ class ArrayLayout:
         return table, _lay_out(self._entries, self._steps, self._owners, skipped, blocks, table)
 
     def zeros(self) -> Any:
-        """Return new arrays of zeros as a pack; the layout is that of one named tuple."""
+        """Return new arrays of zeros as a pack, for a layout of one named tuple."""
         blocks = self.blank()
         for block in blocks:
             block[:] = 0

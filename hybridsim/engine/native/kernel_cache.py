@@ -83,7 +83,7 @@ class _Versions:
         store_whole(self._path(key), dumps((self._stamp, key, data)))
 
     def load(self, key: Any) -> Any:
-        """Return the compiled version for a key, or None if there is none for this source."""
+        """Return the compiled version for a key, or None if this source has no version for the key."""
         content = load_whole(self._path(key))
         if content is None:
             return None

@@ -125,7 +125,7 @@ if ENABLED:
 
     @intrinsic
     def pack_at(typingctx: Any, address: Any, like: Any) -> Any:
-        """Return a pack of the same type as `like`, whose table is at an address."""
+        """Return a pack of the type of `like` for the table at an address."""
         return like(types.int64, like), lambda context, builder, signature, arguments: arguments[0]
 
     def opaque(pack: Any) -> Any:

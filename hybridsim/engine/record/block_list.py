@@ -97,7 +97,7 @@ class BlockList(Sequence[Item]):
         return rest + sum(map(len, self.blocks[max(number, 0) :]))
 
     def without_last(self, count: int) -> list[Any]:
-        """Return a list without the last `count` items, to which other items can be added."""
+        """Return a list without the last `count` items; other items can be added to this list."""
         blocks = list(self.blocks)
         while blocks and count >= len(blocks[-1]):
             count -= len(blocks.pop())
@@ -169,7 +169,7 @@ class SegmentBlockList(BlockList[Segment]):
         return self.window == 0.0
 
     def drop_all_but_end(self) -> None:
-        """Replace all segments by the end of the last one, unless they have been replaced already."""
+        """Replace all segments by the end of the last segment, unless this has been done already."""
         last = self.blocks[-1]
         if len(self.blocks) > 1 or len(last) > 1 or not isinstance(last, list) or len(last[0].s) > 1:
             self.set_end(last.at_end())

@@ -156,7 +156,7 @@ def stays_positive(terms: Any, first: int, rest: float, d: float, error: float) 
 
 @inlined
 def past_dip(terms: Any, first: int, longest: float, error: float, backward: Any) -> float:
-    """Return a point after the minimum of a guard that falls and rises, or 0 if there is none."""
+    """Return a point after the minimum of a guard that falls and rises, or 0 if there is no minimum."""
     a, b, c = terms[first], terms[first + 1], terms[first + 2]
     if not (b < 0.0 < c and b * b < _DIPS * a * c):
         return 0.0

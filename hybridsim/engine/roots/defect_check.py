@@ -1,4 +1,4 @@
-"""This module evaluates the end of a Taylor step, and checks the accuracy of the series there.
+"""This module evaluates the end of a Taylor step, and checks the accuracy of the series at this end.
 
 The results are in one array: the powers d**k, k = 0..order; for n states their values, their rates, the
 slopes of their series times d, and sum_k |c_k| d**k, k > 0; for the guards their values and those

@@ -140,7 +140,7 @@ def signs_of(b: Any, error: float) -> int:
 
 @kernel
 def dips(b: Any) -> bool:
-    """Return whether Bernstein coefficients fall below half of the first one and rise again."""
+    """Return whether Bernstein coefficients fall below half of the first coefficient and rise again."""
     lowest = b[0]
     for i in range(1, b.shape[0]):
         if b[i] > lowest and lowest < 0.5 * b[0]:

@@ -165,7 +165,7 @@ def _first_place(
 
 @inlined
 def _changes(b: Any) -> tuple[int, bool]:
-    """Return how often Bernstein coefficients change their sign, and whether the first is positive."""
+    """Return how often Bernstein coefficients change their sign, and whether the first coefficient is positive."""
     changes, last, first = 0, 0.0, 0.0
     for i in range(b.shape[0]):
         if b[i] != 0.0:

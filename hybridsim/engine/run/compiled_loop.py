@@ -107,7 +107,7 @@ class CompiledLoop:
         self.renew()
 
     def pass_monitors(self, corners: MonitorCorners) -> None:
-        """Make this loop, whose system has corners in place of monitors, the loop of the system with monitors."""
+        """Use this loop, whose system has corners in place of monitors, as the loop of the system with monitors."""
         self.corners, self.system, self.kernels.recorded = corners, corners.plain, corners.plain
 
     def look_ahead(self, timetable: Timetable, end: Instant) -> None:
@@ -152,7 +152,7 @@ class CompiledLoop:
         self.used = (rows, segments)
 
     def go(self, origin: Instant, state: HybridState, target: Instant) -> KernelRun | None:
-        """Call the kernel without storing the result in the trajectory; return None if impossible."""
+        """Call the kernel without storing the result in the trajectory; return None if this is impossible."""
         kernels, tape_cache = self.kernels, self.tape_cache
         tape_cache.surround(state.z)
         tapes = tape_cache.tapes  # read once, because another thread may replace them

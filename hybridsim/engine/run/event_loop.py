@@ -103,7 +103,7 @@ class SegmentStart(NamedTuple):
 
 
 class SegmentEnd(NamedTuple):
-    """The result of a segment kernel; fields after `outcome` have values only if it is FOLLOWED.
+    """The result of a segment kernel; fields after `outcome` have values only if `outcome` is FOLLOWED.
 
     The fields from `at` on have values only if a guard fired.
     """
@@ -128,7 +128,7 @@ def not_followed(outcome: int) -> SegmentEnd:
 
 @inline_always
 def end_without_event(call: Any, state: Any, work: Any, s: float, is_divided: bool) -> int:
-    """Adopt the states at the end of the last segment of a call, and return why the call ends there.
+    """Adopt the states at the end of the last segment of a call, and return the reason for this end.
 
     A segment that is too long is divided: it goes on in the same modes, where active guards are positive.
     """

@@ -54,7 +54,7 @@ def skipped_rows(first: int, steps: int, count: int) -> np.ndarray:
 
 
 class LoopResult(NamedTuple):
-    """The end of a compiled call: the next segment's origin, the state there, and the reason for the end.
+    """The end of a compiled call: the origin and the state of the next segment, and the reason for the end.
 
     end: ARRIVED at the target, PAUSED because the arrays are full, or BEFORE_SOMETHING that is not ordinary. instants
     (E, 2): instants of the events. owners (E,): the components whose guards fired. outcome: makes the state on demand.
@@ -128,7 +128,7 @@ class KernelRun:
         self._event_block: EventBlock | None = None
 
     def _array(self, name: str) -> np.ndarray:
-        """Return an array of the record that is kept with the events."""
+        """Return an array of the part of the record that is kept with the events."""
         return self.array_layout.array((None, self._event_memory), name)
 
     @cached_property
@@ -190,12 +190,12 @@ class KernelRun:
 
     @property
     def _have_fired(self) -> np.ndarray:
-        """Return, for each segment, whether a guard ended it; otherwise a known time or a monitor ended it."""
+        """Return for each segment whether a guard ended the segment, and not a known time or a monitor."""
         fires = self._fires[self._ended]
         return np.asarray((fires >= 0) & (fires < self.system.guard_count))
 
     def plain_modes(self, modes: np.ndarray) -> np.ndarray:
-        """Return modes (k, C) without those of the corners of monitors."""
+        """Return modes (k, C) without the modes of the corners of monitors."""
         return modes if self.corners is None else np.ascontiguousarray(modes[:, : len(self.system.automata)])
 
     def outcome(self) -> Outcome:

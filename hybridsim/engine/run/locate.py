@@ -219,7 +219,7 @@ class Locator:
         return Hit(polish(sample, Crossing(0.0, 1.0, -1)), guard, -1)
 
     def _rounding(self, step: Step, number: int, is_monitor: bool) -> Callable[[], float]:
-        """Return a function that computes the rounding error of a guard or monitor on the step, on demand."""
+        """Return a function that computes, on demand, the rounding error of a guard or monitor on the step."""
         known: list[float] = []
 
         def bound() -> float:

@@ -1,4 +1,4 @@
-"""Determine the state at a located event with error bounds, and all guards and monitors that are zero there."""
+"""Determine the state at a located event with error bounds, and all guards and monitors at zero."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def situation(system: System, arrival: Arrival, segment: SegmentRun) -> Situatio
 
 
 def distance_of_zero(series: Any) -> float:
-    """Return the time from a point to the zero of a function, from its Taylor coefficients; 0 if undetermined.
+    """Return the time from a point to the zero of a function, from its Taylor coefficients, or 0 if undetermined.
 
     For a function that only touches zero the slope is useless: a double zero is at the distance sqrt(2 |g/g''|).
     """
@@ -142,7 +142,7 @@ def coincident(
 def located(
     system: System, origin: Instant, arrival: Arrival, segment: SegmentRun, target: float, is_due: bool
 ) -> Located:
-    """Return the guards and monitors that are zero at the end of a segment, and the state there.
+    """Return the state at the end of a segment, with the guards and monitors at zero.
 
     is_due: something is scheduled at the local time `target`, which may be this instant.
     """
@@ -189,7 +189,7 @@ def as_stepped(system: System, at: Situation, arrival: Arrival, segment: Segment
 def _as_due(
     system: System, origin: Instant, at: Situation, series: Any, arrival: Arrival, known_at: float
 ) -> tuple[Situation, Any]:
-    """Return the state at a scheduled time; use the wider error bounds if more functions are zero within them."""
+    """Return the state at a scheduled time, with the wider error bounds if these contain more zeros."""
     slopes = np.abs(system.flow(at.s, at.x, at.p, at.z)) if system.n else 0.0
     wide = replace(at, x_error=at.x_error + known_at * slopes, s_error=at.s_error + known_at)
     known = system.series(wide.s, wide.x, wide.p, wide.z, wide.x_error, wide.s_error)

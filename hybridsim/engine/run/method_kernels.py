@@ -103,7 +103,7 @@ class MethodKernels(ABC):
         vectors: np.ndarray,
         jumps: np.ndarray,
     ) -> SegmentBlock:
-        """Return the segments of a call as one block; `last_steps` contains the last step of each."""
+        """Return the segments of a call as one block; `last_steps` contains the last step of each segment."""
 
     def part_of(self, known: KnownTimes) -> KnownTimes:
         """Return the known times that one call can pass: all of the given times, or the first of them."""

@@ -1,4 +1,4 @@
-"""The mode loop: integrate to the first event, resolve it, and continue; it is the same for all methods."""
+"""The mode loop of all methods: integrate to the first event, resolve the event, and continue."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ class ModeLoop:
         return self.lazy_state.p
 
     def _set_state(self, instant: Instant, make: Callable[[], Outcome]) -> None:
-        """Set the instant at which the next segment begins; the state there is computed on demand."""
+        """Set the instant at which the next segment begins; the state at this instant is computed on demand."""
         self.lazy_state = LazyState(self.system, instant, self.forward, make)
 
     def _progress(self, instant: Instant) -> None:
@@ -354,7 +354,7 @@ class ModeLoop:
         return run
 
     def _store(self, run: SegmentRun) -> None:
-        """Append a segment with its steps, and the events in it that did not end it."""
+        """Append a segment with its steps, and with the events before its end."""
         record = self.record
         if len(run.knots) > 1:
             record.segments.append(run.segment())
@@ -437,7 +437,7 @@ class ModeLoop:
         error: np.ndarray,
         s_error: float,
     ) -> list[tuple[object, ...]]:
-        """Return the resets of monitors that fire at an instant; they read the state before all changes.
+        """Return the resets of monitors that fire at an instant; the resets read the state before all changes.
 
         Guards, schedules and inputs of the instant decide which monitors fire; the resets of monitors do not.
         """
@@ -473,7 +473,7 @@ class ModeLoop:
         return apply_crossed(self.system, self.forward, found, 0.0, monitors) if monitors else found
 
     def _accumulated(self, instant: Instant, x_minus: np.ndarray, fired: tuple[int, ...]) -> bool:
-        """Detect an accumulation of events; return whether the run ends there."""
+        """Detect an accumulation of events; return whether the run ends at the accumulation."""
         closed = closed_now(self.system, self.outcome)
         self.accumulation.forget(closed)  # a closed contact does not bounce any more
         changed = {c.component for c in self.outcome.changes}.difference(closed)
@@ -488,7 +488,7 @@ class ModeLoop:
         return self._ends_at(hidden or limit)
 
     def _ends_at(self, limit: Limit | None) -> bool:
-        """Continue the run from a limit of events, if there is one; return whether the run ends there."""
+        """Continue the run from a limit of events, if there is one; return whether the run ends at the limit."""
         stop = False if limit is None else self._gathered(limit)
         if limit is None or stop is not None:
             return bool(stop)

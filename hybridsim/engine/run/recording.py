@@ -34,14 +34,14 @@ class Recorder:
         self.record.counters.events += len(changes)
 
     def schedules(self, schedules: Sequence[int]) -> list[str]:
-        """Record the schedules that are due, and return the names of those that end the run."""
+        """Record the schedules that are due, and return the names of the schedules that end the run."""
         declared = [self.system.model.schedules[k] for k in schedules]
         for schedule in declared:
             self._append("scheduled", schedule.name, 0)
         return [schedule.name for schedule in declared if schedule.terminate]
 
     def fired(self, outcome: Outcome, monitors: MonitorSides, is_last: bool) -> list[str]:
-        """Record the monitors that fire at an instant, and return those that end the run.
+        """Record the monitors that fire at an instant, and return the monitors that end the run.
 
         is_last: nothing else follows at this instant. Otherwise only monitors whose resets were applied are recorded.
         """

@@ -44,7 +44,7 @@ class Report:
 
 
 def describe(model: Model) -> Report:
-    """Report the structure of a model without compiling it; raise an error if no run could start with it."""
+    """Report the structure of a model without compiling it; raise an error if no run of the model could start."""
     model = smoothed(model)
     system = System(model, as_written=True)
     discrete = np.array(list(model.discrete_values().values()), dtype=float)

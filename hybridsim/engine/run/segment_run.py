@@ -363,7 +363,7 @@ class SegmentRun:
         return step, None
 
     def _refine(self, step: Step, hit: Hit, is_monitor: bool) -> tuple[Step, bool]:
-        """Return the step up to the event and True if it is accurate, otherwise a shorter step and False.
+        """Return the step up to the event and True if this step is accurate, otherwise a shorter step and False.
 
         If the dense output is less accurate than the method, the step is repeated to the event time, which Newton's
         method corrects until the guard is zero within rounding. An event in a step whose error there exceeds the

@@ -55,7 +55,7 @@ class LazyState:
         return self._system.vector(self._instant, self._system.discrete(self.outcome.p), self._forward)
 
     def read(self) -> tuple[Outcome, np.ndarray]:
-        """Return the outcome and the run-time vector for reading; they must not be modified."""
+        """Return the outcome and the run-time vector for reading; the caller must not modify them."""
         return self._shared or (self.outcome, self.p)
 
 
@@ -120,7 +120,7 @@ class RunSetup:
         return LazyState(self.system, self.origin, task.forward, settled[0].copy, settled)
 
     def _at_start(self, task: Task, due: tuple[int, ...]) -> tuple[Outcome, np.ndarray]:
-        """Return the outcome at the start, and the run-time vector there."""
+        """Return the outcome and the run-time vector at the start."""
         system, forward = self.system, task.forward
         if self._start is None and self._buffer is not None:
             self._start = self._buffer.copy().outcome(), self._buffer.p

@@ -46,7 +46,7 @@ class Step:
 
 @dataclass(frozen=True)
 class Watch:
-    """The active guards and all monitors of one segment, with their sides and orders of zero at its start."""
+    """The active guards and all monitors of one segment, with their sides and orders of zero at the start."""
 
     guards: np.ndarray  # numbers of the active guards
     sides: np.ndarray  # sides (G,) of all guards
@@ -189,7 +189,7 @@ class Method(Protocol):
         """Return the largest rounding error of a step, relative to the rounding of the state change."""
 
     def compiled_loop(self, system: System, tolerances: Tolerances, longest: float) -> CompiledLoop | None:
-        """Return the compiled loop of this method for one run, or None if it cannot compile the model."""
+        """Return the compiled loop of this method for one run, or None if the method cannot compile the model."""
 
     def start(
         self,

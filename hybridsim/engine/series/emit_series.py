@@ -50,7 +50,7 @@ def _results(op: int) -> int:
 
 @dataclass(frozen=True)
 class ModeTape:
-    """The parts of the optimised instruction tape of one combination of modes from which the code is written.
+    """The parts of an optimised instruction tape from which the code of one combination of modes is written.
 
     These are its rows, the rows of high orders, the registers of time, states, rates, active guards and
     arguments of fading functions, and the conditions that stay constant as time passes.
@@ -229,7 +229,7 @@ def ends_text(tape: ModeTape, terms: int, first: int, order: int) -> str:
 
 
 def series_text(tape: ModeTape, order: int) -> str:
-    """Return a module with series_0, values_0, ahead_0 and sizes_0; raise TooLong if it is too long."""
+    """Return a module with series_0, values_0, ahead_0 and sizes_0; raise TooLong for a module that is too long."""
     parts = (
         series_function("series_0", tape, order),
         values_function("values_0", tape, order + 1),

@@ -50,7 +50,7 @@ class OptimisedTape:
 
 
 def separate_registers(tape: dict[str, Any]) -> dict[int, int]:
-    """Return separate registers for values that are constant in some modes and not in others.
+    """Return separate registers for values that are constant in some modes and vary in other modes.
 
     A compiled loop keeps its registers from mode to mode and writes only the leading coefficient of a
     constant. Without separate registers, the higher coefficients of another mode would remain.
@@ -149,7 +149,7 @@ def _array(rows: list[tuple[int, ...]]) -> np.ndarray:
 
 
 def _registers(op: int) -> int:
-    """Return how many of a, b and c in a row are registers; the others are flags of the operation."""
+    """Return how many of a, b and c in a row are registers; the other entries are flags of the operation."""
     return 1 if op in _ONE else 3 if op == ops.SELECT else 2
 
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Compiled:
-    """The functions of a model: compiled ones for kernels, and Python ones for events."""
+    """The functions of a model: compiled functions for kernels, and Python functions for events."""
 
     module: ModuleType
     seconds: float  # time of lowering; 0 if the module was cached

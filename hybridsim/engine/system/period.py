@@ -62,7 +62,7 @@ def _multiple_of_all(periods: list[float], most: int) -> float | None:
 
 
 def forcing_period(model: Model) -> float | None:
-    """Return the period of a model's forcing at its parameter values, or None if there is no single one."""
+    """Return the period of a model's forcing at its parameter values, or None if there is no single period."""
     from hybridsim.engine.native.compiler import announce_compilation
     from hybridsim.engine.system.system import System
 

@@ -23,7 +23,7 @@ Displaced = Callable[[float, np.ndarray, np.ndarray], np.ndarray]
 def slopes_at_edge(
     displaced: Displaced, s: float, x: np.ndarray, p: np.ndarray, seeds: np.ndarray
 ) -> np.ndarray:
-    """Return the derivatives (W, D) along the columns of `seeds`, with NaN where they do not exist.
+    """Return the derivatives (W, D) along the columns of `seeds`, with NaN for derivatives that do not exist.
 
     A side on which the functions have no values is left out.
     """

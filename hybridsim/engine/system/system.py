@@ -272,7 +272,7 @@ class System(_Frame):
         return {a.name: a.modes[m] for a, m in zip(self.automata, z, strict=True)}
 
     def hot_functions(self) -> tuple[str, ...]:
-        """Return the functions that every run needs; others are compiled on first use."""
+        """Return the functions that every run needs; other functions are compiled on first use."""
         names = ["flow", *(["guards"] if self.guard_count else []), *(["project"] if self.can_hold else [])]
         names += ["monitors"] if self.monitor_names else []
         return tuple(names)

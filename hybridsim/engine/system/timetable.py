@@ -15,7 +15,7 @@ from hybridsim.expr import evaluate
 
 @dataclass(frozen=True)
 class Appointment:
-    """A scheduled time that a step must reach exactly, and the schedules that are due then.
+    """A scheduled time that a step must reach exactly, and the schedules that are due at this time.
 
     A schedule that lists this time several times occurs as often. At a renewal only the local time is restarted.
     first: the nearest of the times that are merged here, if it is another one than the instant.
@@ -154,5 +154,5 @@ class Timetable:
         return self.settled is not None and self._are_equal(instant, self.settled)
 
     def _are_equal(self, one: Instant, other: Instant) -> bool:
-        """Return whether two instants are equal within rounding, by the larger one of their rounding errors."""
+        """Return whether two instants are equal within rounding, by the larger of their two rounding errors."""
         return abs(one.minus(other)) <= max(self._slack(one), self._slack(other))

@@ -210,7 +210,7 @@ def implicit_matrix(
 
 @inlined
 def forces(table: Any, scratch: Any, m: int, tolerance: float, has_impacts: bool) -> bool:
-    """Compute the forces at the end of a step by projected Gauss-Seidel; return whether they converged.
+    """Compute the forces at the end of a step by projected Gauss-Seidel; return whether the forces converged.
 
     Each force holds its surface at zero if its limits allow; otherwise it is the slip force. The force of a
     gap is the smallest one with the required rebound.

@@ -68,7 +68,7 @@ class SolverStepper:
         return rate
 
     def _jacobian(self, s: float, x: np.ndarray) -> np.ndarray:
-        """Return the Jacobian, or zeros if it is not finite, so that SciPy tries a shorter step."""
+        """Return the Jacobian, or zeros if the Jacobian is not finite, so that SciPy tries a shorter step."""
         jacobian = self.flow.jacobian(s, x)
         return jacobian if np.isfinite(jacobian).all() else np.zeros_like(jacobian)
 
@@ -89,7 +89,7 @@ class SolverStepper:
         return self._advance(self.solver)
 
     def restep(self, step: Step, s: float) -> Step:
-        """Repeat a step to exactly the local time `s`, or return a shorter step if the solver takes one."""
+        """Repeat a step to exactly the local time `s`, or return a shorter step if the solver takes a shorter one."""
         solver = self._solver(step.s0, step.x0, s, abs(s - step.s0))
         part = self._advance(solver)
         if solver.status != "running":

@@ -1,4 +1,4 @@
-"""This module converts a mechanical system to an ordinary model, as an independent way to simulate it."""
+"""This module converts a mechanical system to an ordinary model, as an independent way of simulation."""
 
 from __future__ import annotations
 

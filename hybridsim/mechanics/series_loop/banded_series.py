@@ -33,7 +33,7 @@ _SLIP, _BESIDE, _FORWARD, _BASE, _MOBILITY, _HOLDING, _STILL, _DIAGONALS = range
 
 @kernel
 def gather_neighbours(arrays: Any, state: Any, scratch: Any, count: int, tau: float, top: int) -> bool:
-    """Store the values of the patch at time tau if its nodes are consecutive; return whether they are."""
+    """Store the values of the patch at time tau if its nodes are consecutive; return whether values were stored."""
     first, last = scratch.nodes[0], scratch.nodes[0]
     for i in range(count):
         first, last = min(first, scratch.nodes[i]), max(last, scratch.nodes[i])

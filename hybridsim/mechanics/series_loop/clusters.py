@@ -53,7 +53,7 @@ def factorise(arrays: Any, state: Any, scratch: Any, j: int) -> None:
 
 @kernel
 def _anchors(arrays: Any, state: Any, first: int, last: int) -> None:
-    """For each sticking contact on several coordinates, choose the one that satisfies its constraint exactly.
+    """For each sticking contact on several coordinates, choose the coordinate that satisfies its constraint exactly.
 
     It is the coordinate with the largest weight. Contacts that share coordinates are solved by least squares only.
     """

@@ -244,7 +244,7 @@ def _change(state: Any, scratch: Any, count: int, together: bool) -> None:
 
 @kernel
 def _hold_at_limits(arrays: Any, state: Any, scratch: Any, j: int, count: int) -> None:
-    """Hold slipping contacts at their limit force if sticking contacts prevent their motion; release others."""
+    """Hold slipping contacts at their limit force if sticking contacts prevent their motion; release all others."""
     for z in range(count):
         c = scratch.zero[z]
         if state.mode[c] == STICK and state.held[c] == 0:
@@ -258,7 +258,7 @@ def _hold_at_limits(arrays: Any, state: Any, scratch: Any, j: int, count: int) -
 
 @kernel
 def _is_held(arrays: Any, state: Any, j: int, c: int) -> bool:
-    """Return whether a contact's direction is a combination of those of sticking contacts."""
+    """Return whether the direction of a contact is a combination of the directions of sticking contacts."""
     first, last = arrays.node_con[j], arrays.node_con[j + 1]
     m, at = last - first, arrays.g_ptr[j]
     own = arrays.g_val[at + (c - first) * m + (c - first)]

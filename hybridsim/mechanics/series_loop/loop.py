@@ -162,7 +162,7 @@ def _changes_outside(
 def _restart(
     arrays: Any, laws: Any, state: Any, scratch: Any, record: Any, control: Any, j: int, tau: float
 ) -> int:
-    """Restart a patch around node j at tau; return 1, or 0 if it would be too large, or -1 without a series."""
+    """Restart a patch around node j at tau; return 1, or 0 for a patch that is too large, or -1 without a series."""
     rtol, _, top, is_recorded, _ = control
     nodes = arrays.node_dof.shape[0] - 1
     left = state.clock[2] - tau
@@ -224,7 +224,7 @@ def _record_events(
 
 @kernel
 def _end_step(arrays: Any, state: Any, scratch: Any, tau: float) -> None:
-    """Evaluate all positions and velocities at tau, and begin the next step there."""
+    """Evaluate all positions and velocities at tau, and begin the next step at tau."""
     for x in range(arrays.dof_node.shape[0]):
         scratch.acc[x] = tau - state.origin[arrays.dof_node[x]]
     for x in range(0, arrays.dof_node.shape[0], WIDTH):

@@ -256,7 +256,7 @@ def sides(law: Any) -> tuple[tuple[Any, Any], tuple[Any, Any]]:
 
 
 def law_tapes(contacts: list[MechanicalContact]) -> tuple[Laws, np.ndarray, np.ndarray, bool]:
-    """Return the tapes of the laws, the tape of each contact in each direction, and the constants."""
+    """Return the instruction tapes of the laws, the tape of each contact in each direction, and the constants."""
     tapes: list[ScalarTape] = []
     known: dict[tuple[str, str], int] = {}
     number = np.zeros((len(contacts), 2), dtype=np.int64)

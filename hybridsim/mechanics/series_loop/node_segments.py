@@ -1,4 +1,4 @@
-"""This module stores a run as Taylor series for each node and time interval, and evaluates it at any time."""
+"""This module stores a run as Taylor series for each node and time interval, and evaluates the run at any time."""
 
 from __future__ import annotations
 

@@ -49,7 +49,8 @@ class SeriesTrajectory(ArraysTrajectory):
         """Raise an error on pickling and copying, because copied arrays would lose their padding."""
         raise UsageError(
             'a run of a MechanicalSystem with integrator="taylor" cannot be pickled or copied',
-            remedy="use its tables, such as sol.to_npz(path) or sol.table(), or run system.to_model()",
+            remedy="use the tables of the solution, such as sol.to_npz(path) or sol.table(), or run "
+            "system.to_model()",
         )
 
     # -- times and states -----------------------------------------------------------------------------------

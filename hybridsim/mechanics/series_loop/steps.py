@@ -32,7 +32,7 @@ _TINY = 2.0**-40  # of the step; an exit that is undecided on such a short inter
 
 @kernel
 def set_time(tree: Any, leaf: int, t: float) -> None:
-    """Store a time in the tournament tree; tree[1] is the earliest of all."""
+    """Store a time in the tournament tree; tree[1] is the earliest of all times."""
     i = tree.shape[0] // 2 + leaf
     tree[i] = t
     i >>= 1
@@ -325,7 +325,7 @@ def step_length_kernel(arrays: Any, laws: Any, state: Any, scratch: Any) -> int:
 
 @inlined
 def step_length(arrays: Any, laws: Any, state: Any, scratch: Any, longest: float, rtol: float) -> float:
-    """Return the time over which the series of a patch are accurate, and find the exits from modes within it.
+    """Return the time over which the series of a patch are accurate, and find the exits from modes in this time.
 
     NaN if there is no such length.
     """

@@ -155,7 +155,7 @@ def slip_forces(arrays: Any, laws: Any, scratch: Any) -> None:
 
 @kernel
 def sweep(arrays: Any, state: Any, scratch: Any, h: float, tolerance: float) -> bool:
-    """Compute impulses for given slip forces by projected Gauss-Seidel; return whether they converge.
+    """Compute impulses for given slip forces by projected Gauss-Seidel; return whether the impulses converge.
 
     Only contacts with a changed neighbour are swept. A friction impulse is positive along its direction, so that a
     force f gives - h f.
@@ -221,7 +221,7 @@ def sweep(arrays: Any, state: Any, scratch: Any, h: float, tolerance: float) -> 
 def impulses(
     arrays: Any, laws: Any, state: Any, scratch: Any, h: float, tolerance: float, iterations: int
 ) -> bool:
-    """Compute the impulses of a step, with slip forces at the end velocities; return whether they converge."""
+    """Compute the impulses of a step, with slip forces at the end velocities; return whether the impulses converge."""
     nc = scratch.speed.shape[0]
     slip_forces(arrays, laws, scratch)
     for _ in range(iterations):

@@ -58,7 +58,7 @@ class SteppedTrajectory(ArraysTrajectory):
         return self._states.T
 
     def states(self, times: np.ndarray, side: str) -> np.ndarray:
-        """Return the states (k, 2n) at given times; they are the same on both sides of an event."""
+        """Return the states (k, 2n) at given times; the states are equal on both sides of an event."""
         n, first = self.model.n, self._step_of(times)
         after = np.minimum(first + 1, self.run.done)
         d = (times - self.own_times[first])[:, None]

@@ -34,7 +34,7 @@ class Denominator:
         return ast.unparse(self.tree)
 
     def sign(self, values: Mapping[str, float]) -> int:
-        """Return the sign of the denominator at a state and time, or 0 if it is zero or undefined."""
+        """Return the sign of the denominator at a state and time, or 0 if the denominator is zero or undefined."""
         known = dict(values)
         try:
             for name, tree in self.definitions.items():
@@ -46,7 +46,7 @@ class Denominator:
 
 
 def denominators(model: Model) -> tuple[Denominator, ...]:
-    """Return denominators in rates that depend on states, parameters and t and may change their sign.
+    """Return denominators in rates, if they depend on states, parameters and t only and may change their sign.
 
     Denominators inside a condition are omitted, because the condition may exclude the zero. Denominators that are never
     negative by their form are omitted too.
@@ -77,7 +77,7 @@ def _denominators(model: Model) -> Iterator[Denominator]:
 
 
 def _divisors(node: ast.expr) -> Iterator[ast.expr]:
-    """Yield divisors and bases of negative powers in an expression, without those inside conditions."""
+    """Yield divisors and bases of negative powers in an expression, except inside conditions."""
     match node:
         case ast.IfExp():
             return

@@ -52,7 +52,7 @@ class Scope(Findings):
             return ()
 
     def _expanded(self) -> Iterator[Component]:
-        """Yield all components that can be built; errors in others have been reported."""
+        """Yield all components that can be built; errors in the other components have been reported."""
         for parts in self.made:
             yield from parts
         yield from (surface.component() for surface in self.model.surfaces)
@@ -168,7 +168,7 @@ class Scope(Findings):
             self.errors.append(fault)
 
     def reached(self, expr: Expression) -> frozenset[str]:
-        """Return the names that an expression depends on, including those in definitions."""
+        """Return the names that an expression depends on, including the names in its definitions."""
         definitions = dict(self.model.definitions)
         found: set[str] = set()
         open_names = set(expr.names)

@@ -64,7 +64,7 @@ def _starts(model: Model, component: Component, meanings: Meanings) -> Iterator[
 
 
 def _value_at_start(model: Model, expr: Expression, meanings: Meanings) -> float | None:
-    """Return the value of an expression at the start, or None if it has none."""
+    """Return the value of an expression at the start, or None if the value is undefined."""
     starts = model.start_values() | model.discrete_values()
     values = {**model.parameter_values(), **starts, TIME: 0.0}
     return number_of(meanings.written_out(expr.tree), values, meanings.lookup)

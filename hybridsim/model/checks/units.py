@@ -27,7 +27,7 @@ def units_of(model: Model) -> dict[str, str]:
 
 
 def label_of(unit: str) -> str:
-    """Return a unit as a label; pure numbers have none."""
+    """Return a unit as a label; a pure number has no label."""
     return "" if unit == "1" else unit
 
 

@@ -62,13 +62,13 @@ def _carry_out(findings: Findings, checks: Iterable[_Check] | None) -> None:
 
 
 def checked_names(model: Model) -> frozenset[str]:
-    """Return the parameters that these checks depend on; all others may have any finite value."""
+    """Return the parameters that these checks depend on; all other parameters may have any finite value."""
     used = frozenset[str]().union(*(check.names for check in _checks_of(model) if check.defines is None))
     return used & {parameter.name for parameter in model.parameters}
 
 
 def _checks_of(model: Model) -> list[_Check]:
-    """Return all checks in their order; copies with other numbers share them."""
+    """Return all checks in order; copies of the model with other numbers share the checks."""
     found: list[_Check] = model.once_per_expressions("checks of values", lambda: list(_all_checks(model)))
     return found
 
@@ -144,7 +144,7 @@ def _requirement(findings: Findings, requirement: Requirement, values: dict[str,
 
 
 def _value(findings: Findings, expr: Expression, values: dict[str, float]) -> float | None:
-    """Return the value of an expression, or None after reporting that it has no value."""
+    """Return the value of an expression; if it has no value, report this and return None."""
     try:
         return evaluate(expr, values)
     except ModelError as fault:

@@ -121,7 +121,7 @@ class Element(Declared):
             raise self._fault(f"`ticks` cannot be {ticks!r}", f"use a whole number from 1 to {_MOST_TICKS}")
 
     def refuse_unless_complete(self) -> None:
-        """Raise an error for an unknown kind, and for fields that the kind lacks or does not have."""
+        """Raise an error for an unknown kind, for missing fields, and for fields that the kind does not have."""
         what = f"element {self.name}"
         if self.kind not in KINDS:
             raise self.error(f"{what}: unknown kind '{self.kind}'", nearest(self.kind, KINDS, kind="kinds"))

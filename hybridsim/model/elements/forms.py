@@ -53,7 +53,7 @@ def _form(element: Element, template: str, **names: str) -> Expression:
 
 
 class _Forms:
-    """The declarations of a model, to which those of its elements are added."""
+    """The declarations of a model, to which the declarations of its elements are added."""
 
     def __init__(self, model: Any) -> None:
         self.model = model
@@ -186,7 +186,8 @@ class _Forms:
         signal = next((one for one in self.inputs if one.name == element.input.text), None)
         if signal is None or signal.kind not in ("table", "wave"):
             raise element.error(
-                f"{what}: '{element.input.text}' cannot be delayed by a time, because a model keeps no past of states",
+                f"{what}: '{element.input.text}' cannot be delayed by a time, because a model "
+                "does not store past states",
                 "set `clock` and `ticks` to delay a sampled value, or approximate the delay by further states; `time` "
                 "delays inputs of kind 'table' and 'wave'",
             )

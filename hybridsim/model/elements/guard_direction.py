@@ -23,7 +23,7 @@ Definition = tuple[str, Expression]
 
 
 def without_directions(components: Iterable[Component], definitions: Iterable[Definition]) -> dict[str, Any]:
-    """Return components whose guards have no direction, and the definitions together with those of their guards.
+    """Return components whose guards have no direction, and the definitions, including those for these guards.
 
     Each component is followed by the automata of its guards.
     """
@@ -66,7 +66,7 @@ def _word(label: str) -> str:
 
 
 def _side(name: str, guard: Guard) -> Component:
-    """Return the automaton that follows the sign of a guard's expression, which is defined as ``NAME_value``."""
+    """Return the automaton that follows the sign of a guard's expression; ``NAME_value`` is the expression."""
     rising, falling = (parse(f"{sign}{name}_value", guard.expr.place) for sign in ("", "-"))
     one = parse(1)
     both = guard.direction == "both"

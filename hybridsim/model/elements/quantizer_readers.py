@@ -1,4 +1,4 @@
-"""This module refuses guards, resets and contacts that read a quantizer, which may still have an old value for them.
+"""This module refuses guards, resets and contacts that read a quantizer, whose value may be outdated at an event.
 
 A quantizer takes its steps in the rounds of an event. A rate or an output never meets an old value, because no time
 passes meanwhile; a guard or a reset of the same instant may.
@@ -14,7 +14,7 @@ from hybridsim.model.elements.element import Element
 
 
 def refuse_readers(model: Any, parts: Mapping[str, Any], quantizers: Mapping[str, Element]) -> None:
-    """Raise an error for the first expression that reads a quantizer and decides what happens at an event.
+    """Raise an error for the first expression that reads a quantizer and decides the result of an event.
 
     parts : the definitions, components and schedules of the model together with those of its elements.
     """

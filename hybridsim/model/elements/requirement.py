@@ -44,7 +44,7 @@ class Requirement(Declared):
 
 
 def requirements_of(elements: tuple[Element, ...]) -> Iterator[Requirement]:
-    """Yield the requirements of elements; those that depend on states or time are not checked."""
+    """Yield the requirements of elements; requirements that depend on states or time are left out."""
     for element in elements:
         if element.kind in _ORDERS:
             lower, upper = _ORDERS[element.kind]

@@ -61,11 +61,11 @@ class Copies:
         return (part.place or Place()).inside(self.use)
 
     def expr(self, expr: Expression, *own: str) -> Expression:
-        """Return an expression with the names of the whole model, except for names that it defines itself."""
+        """Return an expression with names of the whole model, except for names that the expression defines itself."""
         return prefixed(expr, self.prefix, self.use, own)
 
     def named(self, values: Mapping[str, Expression]) -> dict[str, Expression]:
-        """Return expressions by the names of quantities of the whole model."""
+        """Return expressions whose keys are names of quantities of the whole model."""
         return {self.prefix + name: self.expr(value) for name, value in values.items()}
 
     def _contact(self, contact: Contact) -> dict[str, Any]:

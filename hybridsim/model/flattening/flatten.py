@@ -124,7 +124,7 @@ def _size(part: Model) -> int:
 
 
 class _Flat:
-    """The declarations of a model and its parts, collected by kind, and the errors found meanwhile."""
+    """The declarations of a model and its parts, collected by kind, and the errors that were found."""
 
     def __init__(self, model: Model) -> None:
         self.errors: list[ModelError] = []
@@ -172,7 +172,7 @@ class _Flat:
         definitions += [(copies.prefix + name, copies.expr(expr)) for name, expr in part.definitions]
 
     def _at(self, use: Use, values: tuple[IndexedExpression, ...], number: int | None) -> Expression:
-        """Return the value for one copy; an error in it is reported."""
+        """Return the value for one copy; an error in the value is reported."""
         value = values[0] if len(values) == 1 else values[(number or 1) - 1]
         try:
             expr = value.at(number, self._repeats)
@@ -213,7 +213,7 @@ def _of_law(contact: Contact, part: Model, start: Mapping[str, Expression]) -> d
 
 
 def _expressions(value: Any) -> Iterator[Expression]:
-    """Yield the expressions in a declaration, except those of a friction law, which has its own names."""
+    """Yield the expressions in a declaration, except the expressions of a friction law, which has its own names."""
     if isinstance(value, Expression):
         yield value
     elif isinstance(value, Mapping):

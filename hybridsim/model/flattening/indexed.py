@@ -33,7 +33,7 @@ class Reference:
 
 @dataclass(frozen=True)
 class IndexedExpression:
-    """An expression with an index; for each number of a repeated part it gives an ordinary expression.
+    """An expression with an index, which gives an ordinary expression for each number of a repeated part.
 
     Parameters
     ----------

@@ -37,13 +37,13 @@ def wrong_signs(model: Model) -> Iterator[tuple[Contact, str, str]]:
 
 
 def wrong_reactions(model: Model) -> Iterator[tuple[Contact, str, str]]:
-    """Yield each contact whose force drives its velocity instead of opposing it, at the start."""
+    """Yield each contact whose force at the start drives its velocity instead of opposing it."""
     numbers = model.parameter_values() | model.start_values() | model.discrete_values() | {TIME: 0.0}
     numbers |= dict.fromkeys((contact.name for contact in model.contacts), 0.0)
     trees = {name: expr.tree for name, expr in model.definitions}
 
     def slope(expr: Expression, name: str) -> float:
-        """Return the slope of an expression with respect to a name, or 0 if it has no value."""
+        """Return the slope of an expression with respect to a name, or 0 if the slope is undefined."""
         ends = [number_of(expr.tree, numbers | {name: numbers[name] + d}, trees.get) for d in (0.0, 1.0)]
         return 0.0 if None in ends else ends[1] - ends[0]  # type: ignore[operator]  # neither is None
 

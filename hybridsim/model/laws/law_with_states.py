@@ -44,7 +44,7 @@ def states_of(contact: Contact, values: Mapping[str, Expression]) -> tuple[State
 def components_of(
     contact: Contact, values: Mapping[str, Expression], loaded: tuple[Guard, ...]
 ) -> Iterator[Component]:
-    """Yield the automata of a law: a single one, or one for each of several copies and one for their sum."""
+    """Yield the automata of a law: a single automaton, or one for each of several copies and one for their sum."""
     law, name, parts = contact.law, contact.name, []
     for index in _indices(contact, values):
         names = _names(contact, values, index)

@@ -180,7 +180,7 @@ def _judged(
 
 
 def _vanishes(node: ast.expr, family: Family, numbers: Mapping[str, float], meanings: Meanings) -> bool:
-    """Return whether an expression is zero at zero velocity, as far as its form shows."""
+    """Return whether the form of an expression shows that it is zero at zero velocity."""
     if not names_of(node).isdisjoint(meanings.moving) and meanings.family(node)[0] == family:
         return True
 

@@ -254,7 +254,7 @@ class Component(Declared):
 
     @property
     def variables(self) -> tuple[str, ...]:
-        """The variables that the modes set, in order of appearance, but the unknown of the surface is first."""
+        """The variables that the modes set: first the unknown of the surface, then others in order of appearance."""
         unknown = [self.surface.unknown] if self.surface else []
         return tuple(dict.fromkeys(unknown + [name for mode in self.modes for name in mode.set]))
 

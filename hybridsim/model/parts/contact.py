@@ -225,7 +225,7 @@ class Contact(Declared):
         return self._at_rest(f"limit{backward}", stick, {})
 
     def _at_rest(self, which: str, force: Expression | None, names: dict[str, Expression]) -> Expression:
-        """Return a force of a set-valued law at zero speed; it is computed once."""
+        """Return a force of a set-valued law at zero speed; the force is computed once."""
         assert force is not None
         if which not in self._forces:
             names |= self.values()

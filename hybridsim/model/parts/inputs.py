@@ -189,7 +189,7 @@ class Input(Declared):
 
 @dataclass(frozen=True)
 class HeldInput(Discrete):
-    """An input of kind "held" as the engine sees it: a discrete state that no reset changes.
+    """An input of kind "held" in the form that the engine uses: a discrete state that no reset changes.
 
     Parameters
     ----------
@@ -207,6 +207,6 @@ class HeldInput(Discrete):
 def held_as_discrete(
     inputs: tuple[Input, ...], discrete: tuple[Discrete, ...]
 ) -> dict[str, tuple[Declared, ...]]:
-    """Return inputs and discrete states, with inputs of kind "held" among the latter, as the engine computes them."""
+    """Return inputs and discrete states as the engine computes them; inputs of kind "held" become discrete states."""
     held = tuple(declared.as_held() for declared in inputs if declared.kind == "held")
     return {"inputs": tuple(i for i in inputs if i.kind != "held"), "discrete": (*discrete, *held)}

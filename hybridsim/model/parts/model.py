@@ -164,7 +164,7 @@ class Model(Declared):
         self._put({"states": tuple(self._with_those_of_laws())})
 
     def _put(self, fields: Mapping[str, Any]) -> None:
-        """Replace declared parts by those that the engine computes."""
+        """Replace declared parts by the parts that the engine computes."""
         for field, parts in fields.items():
             object.__setattr__(self, field, parts)
 
@@ -386,7 +386,7 @@ class Model(Declared):
         return found
 
     def _derived(self) -> list[tuple[str, Expression]]:
-        """Return the parameters that are expressions of others, each after those that it depends on."""
+        """Return the parameters that are expressions of other parameters, in order of evaluation."""
         values = {parameter.name: parameter.value for parameter in self.parameters}
         order = dependency_order(values, "parameters")
         return [(name, values[name]) for name in order if values[name].names]
@@ -404,7 +404,7 @@ class Model(Declared):
         return None if self.duration is None else evaluate(self.duration, self._values)
 
     def all_components(self) -> tuple[Component, ...]:
-        """Return all automata: of contacts, surfaces, impacts and components in this order, corners last."""
+        """Return all automata in the order contacts, surfaces, impacts, components, corners."""
         components: tuple[Component, ...] = self.once("components", self._components)
         return components
 
@@ -456,7 +456,7 @@ class Model(Declared):
 
     @property
     def changed_numbers(self) -> frozenset[str] | None:
-        """The parameters whose numbers may differ from a checked model with the same expressions; None without one."""
+        """The parameters whose numbers may differ from those of a checked model, or None if there is no such model."""
         sound = self._unnumbered.get("sound")
         return None if sound is None else sound[1] | self._renumbered
 

@@ -1,4 +1,4 @@
-"""This module defines the remedies for names that a model has no parameter or no state for."""
+"""This module defines the remedies for names that are not parameters or states of a model."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from hybridsim.model.parts.inputs import HeldInput
 
 
 def remedy_for_parameter(model: Any, name: str, others: tuple[str, ...] = ()) -> str:
-    """Return the remedy for a name that is not a parameter, nor one of the `others`, which are also allowed.
+    """Return the remedy for a name that is neither a parameter nor one of the allowed `others`.
 
     The remedy is the way in which the quantity of that name can be set, the argument of a law to change, or similar
     names.
@@ -40,7 +40,7 @@ def remedy_for_parameter(model: Any, name: str, others: tuple[str, ...] = ()) ->
 
 
 def remedy_for_state(model: Any, name: str) -> str:
-    """Return the remedy for a name that is not a state: the way to set a parameter, similar names, or all names."""
+    """Return the remedy for a name that is not a state: a way to set a parameter, similar names, or all names."""
     if name in [parameter.name for parameter in model.parameters]:
         return (
             f"'{name}' is a parameter; set it with -p {name}=VALUE on the command line and with "

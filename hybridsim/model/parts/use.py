@@ -1,4 +1,4 @@
-"""This module defines the use of one model as a part of another one."""
+"""This module defines the use of one model as a part of another model."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ MAX_REPEAT = 1_000
 
 @dataclass(frozen=True)
 class Use(Declared):
-    """A model that is a part of another model; its quantity x is named ``NAME.x`` there.
+    """A model that is a part of a larger model, which calls the quantity x of this part ``NAME.x``.
 
     The part is an ordinary model. Its inputs of kind "connected" receive expressions of the whole model. Every quantity
     of a part can be used in the whole model by its name with a dot.

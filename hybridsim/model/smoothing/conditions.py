@@ -76,7 +76,7 @@ class _Conditions:
         return whole if whole is not None and whole.test is test else ast.IfExp(test, yes, no)
 
     def _compared(self, apart: ast.expr, op: ast.cmpop, yes: ast.expr, no: ast.expr) -> ast.expr | None:
-        """Split a comparison of a non-smooth expression with zero, or return None for a smooth one."""
+        """Split a comparison of a non-smooth expression with zero, or return None for a smooth expression."""
         tree = self.meanings.written_out(apart)
         match tree:
             case ast.BinOp(
@@ -126,7 +126,7 @@ class _Conditions:
         return None, None
 
     def corner(self, node: ast.IfExp) -> ast.expr | None:
-        """Return a conditional expression as abs or max, or None if it equals neither.
+        """Return a conditional expression as abs or max, or None if neither form is equal to it.
 
         The condition is that the branches differ by a multiple of the compared expression.
         """

@@ -16,7 +16,7 @@ _POWER_OF_ZERO = re.compile(r"\(0\)\*\*\((?!-)")
 
 
 def is_continuous(meanings: Meanings, border: ast.expr, body: ast.expr, orelse: ast.expr) -> bool:
-    """Return whether two expressions are equal wherever `border` is zero, as far as polynomials show.
+    """Return whether polynomials show that two expressions are equal wherever `border` is zero.
 
     They agree if their difference is a multiple of the border, or vanishes when the border is solved for one of its
     names. A power of zero with a parameter as exponent counts as zero.
@@ -31,7 +31,7 @@ def is_continuous(meanings: Meanings, border: ast.expr, body: ast.expr, orelse: 
 
 
 def _solved(border: ast.expr) -> Iterator[dict[str, ast.expr]]:
-    """Yield solutions of border = 0 for each name in which it is linear."""
+    """Yield solutions of border = 0 for each name in which the border is linear."""
     p = difference(border, ast.Constant(0))
     for name in sorted({factor for monomial in p for factor, _ in monomial}):
         if not is_name(name):
@@ -58,7 +58,7 @@ def sides_of_product(meanings: Meanings, node: ast.expr, left: Set[Family] = fro
 
 
 def rooted_in(meanings: Meanings, node: ast.expr) -> frozenset[Family]:
-    """Return each sign in a continuous product whose argument is zero together with a root in the product.
+    """Return each sign in a continuous product if the sign's argument and a root of the product vanish together.
 
     An example is sign(d)*sqrt(abs(d)), which has no Taylor series at d = 0 on either side.
     """

@@ -38,7 +38,7 @@ class Smoothed:
 
 
 def smoothed(model: Model) -> Model:
-    """Return the model with its corners and jumps as components, or the model itself if it has none."""
+    """Return the model with its corners and jumps as components, or the model itself without any."""
     if model.flow is not None:
         return model
     found: Model | None = model.once("smoothed", lambda: _smoothed(model))
@@ -221,7 +221,7 @@ class _Smoothing:
                 and self._has_corner(guard.expr.tree)
             ):
                 self.work.note(
-                    guard.expr.tree, MODE, "its value is never negative, so the guard never fires", here
+                    guard.expr.tree, MODE, "the guard never fires, because its value is never negative", here
                 )
                 self.work.count += 1
                 continue

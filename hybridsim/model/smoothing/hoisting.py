@@ -1,4 +1,4 @@
-"""This module finds jumps inside nonlinear expressions, whose whole value jumps.
+"""This module finds jumps inside nonlinear expressions, so that the whole expression is treated as a jump.
 
 `exp(sign(x))` is `exp(1)` above and `exp(-1)` below x = 0. While a motion slides along x = 0, the term is a convex
 combination of these two values, by Filippov's convention, and not the exponential of an intermediate value.

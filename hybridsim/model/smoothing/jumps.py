@@ -134,7 +134,7 @@ class Borders:
         )
 
     def _slopes(self, argument: ast.expr) -> list[Fraction] | None:
-        """Return the coefficients of the states in a border, or None if it is not linear."""
+        """Return the coefficients of the states in a border, or None if the border is not linear."""
         slopes = dict.fromkeys(sorted(self._moving), Fraction(0))
         for monomial, coefficient in polynomial(self._meanings.written_out(argument)).items():
             moved = [factor for factor in monomial if not self._moving.isdisjoint(NAME.findall(factor[0]))]
@@ -209,7 +209,7 @@ def _times(one: Monomial, other: Monomial, power: int = 1) -> Monomial:
 
 
 def product_of_signs(meanings: Meanings, first: ast.expr, second: ast.expr) -> ast.expr | None:
-    """Return sign(first)*sign(second) as a linear function of both signs, or None if not parallel.
+    """Return sign(first)*sign(second) as a linear function of both signs, or None if the borders are not parallel.
 
     With n, d and g of `apart_by` and n', d', g' their signs, the product is n' d' - d' g' u + n' g' w. Where n or d has
     the value 0, one border is constant, and has the sign that this gives it.

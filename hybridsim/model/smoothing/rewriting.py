@@ -139,7 +139,7 @@ class Rewriting(RewritingState):
         return node if single is node else self.walk(single, here)
 
     def _sign_taken_apart(self, argument: ast.expr, here: Here) -> ast.expr | None:
-        """Return the replacement of the sign of a non-smooth expression, or None for a smooth one."""
+        """Return the replacement of the sign of a non-smooth expression, or None for a smooth expression."""
         minus = ast.UnaryOp(ast.USub(), ast.Constant(1))
         node = ast.IfExp(ast.Compare(argument, [ast.Gt()], [ast.Constant(0)]), ast.Constant(1), minus)
         if self.never_negative(argument) or self._owner(self.meanings.family(argument)[0]) is not None:
@@ -172,7 +172,7 @@ class Rewriting(RewritingState):
             return here
         is_fraction = power is None or power != round(power)
         if is_fraction and not is_clear_of_zero(base, numbers, self.meanings):
-            self.note(node, POWER, f"it has no series where {write(base)} = 0", here)
+            self.note(node, POWER, f"the power has no Taylor series where {write(base)} = 0", here)
         return replace(here, untouched=here.untouched or "it is in a root or a fractional power")
 
     def _side(self, node: ast.expr, parts: Sides, here: Here) -> ast.expr:
@@ -208,7 +208,7 @@ class Rewriting(RewritingState):
             return self._implied(node, above, here)
         owner = self._owner(family)
         if owner is not None:
-            self.note(node, MODE, f"its side follows from the modes of {self.components[owner].name}", here)
+            self.note(node, MODE, f"the modes of {self.components[owner].name} determine the side", here)
             sides = [self.walk(part, here) for part in (below, on_border, above)]
             values = tuple(sides[signs[family] * sign + 1] for signs in self.signs[owner])
             return self._variable(self.implied.setdefault(owner, {}), values)
@@ -227,7 +227,7 @@ class Rewriting(RewritingState):
         pair = self._pair(above, below, family, sign, here)
         if family in self.shared:
             jump = self._jump_at(family, argument, sign)
-            self.note(node, MODE, f"its side follows from the modes of {jump.name}", here)
+            self.note(node, MODE, f"the modes of {jump.name} determine the side", here)
             row = (*(pair if sign == jump.sign else pair[::-1]), self.walk(on_border, here))
             return self._variable(jump.values, row)
         found = self.corners.get(family)
@@ -293,7 +293,7 @@ class Rewriting(RewritingState):
         return self._met[id(node)][1]
 
     def _is_limited(self, branch: ast.expr, argument: ast.expr, family: Family, sign: int) -> bool:
-        """Return whether one side may be undefined beyond the border, such as a root."""
+        """Return whether one side, such as a root, may be undefined beyond the border."""
         border = names_of(self.meanings.written_out(argument)) & self.meanings.moving
         side = resolved(self.meanings, branch, {family: sign})
         return any(names_of(base) & border for base in limited(side, self.meanings))
@@ -396,7 +396,7 @@ class Rewriting(RewritingState):
         return ast.Name(name, ast.Load())
 
     def _implied(self, node: ast.expr, side: ast.expr, here: Here) -> ast.expr:
-        self.note(node, MODE, "its side is known here", here)
+        self.note(node, MODE, "the known signs determine the side", here)
         self.count += 1
         return self.walk(side, here)
 

@@ -13,7 +13,7 @@ SINGLE = "mode"
 
 
 def read_components(root: Table) -> Iterable[Component]:
-    """Yield the automaton of the top-level [modes.*], followed by those of [components.*]."""
+    """Yield the automaton of the top-level [modes.*], followed by the automata of [components.*]."""
     if "modes" in root.data or "initial" in root.data:
         yield _component(SINGLE, root, root.source.place(("modes",)))
     for name, table in root.entries("components", "component"):

@@ -98,7 +98,7 @@ def _split(text: str) -> list[str]:
 
 
 def _model(text: str, path: str | None, files: PartFiles) -> Model:
-    """Build a model from a text, or raise all errors of its tables and of its parts."""
+    """Build a model from a text, or raise all errors of its tables and parts."""
     root = open_text(text, path, "the model")
     name = root.text("name") or (Path(root.source.file).stem if root.source.file else "model")
     errors = root.source.errors

@@ -56,7 +56,7 @@ class Table:
                 self.fail(f"unknown key '{key}'", nearest(key, known, kind="keys"), key)
 
     def only_in(self, *known: str, others: Sequence[str], remedy: str) -> None:
-        """Report every unknown key; the keys `others`, which belong into another table, get the given remedy."""
+        """Report every unknown key; the keys `others`, which belong in another table, get the given remedy."""
         others = [key for key in others if key not in known]
         if others:
             self.fail(f"unknown {', '.join(map(repr, others))}", remedy, others[0])
@@ -93,7 +93,7 @@ class Table:
         return _real(value)
 
     def reals(self, key: str) -> dict[str, float]:
-        """Return a table of numbers, or an empty one if the key is missing."""
+        """Return a table of numbers, or an empty table if the key is missing."""
         found = self._typed(key, dict, "a table of numbers", {})
         table = Table(self.source, (*self.path, key), found, f"{self.kind}, {key}")
         return {name: value for name in found if (value := table.real(name)) is not None}
@@ -133,16 +133,16 @@ class Table:
             return form(0, place)
 
     def mapping(self, key: str) -> dict[str, Any]:
-        """Return a table as it is, or an empty one if the key is missing."""
+        """Return a table unchanged, or an empty table if the key is missing."""
         return dict(self._typed(key, dict, "a table of expressions", {}))
 
     def expressions(self, key: str) -> dict[str, Expression]:
-        """Return a table of expressions, or an empty one if the key is missing."""
+        """Return a table of expressions, or an empty table if the key is missing."""
         found = self._typed(key, dict, "a table of expressions", {})
         return {name: self.parsed(value, key, name) for name, value in found.items()}
 
     def resets(self, key: str) -> dict[str, Expression]:
-        """Return a table of resets, or an empty one if the key is missing."""
+        """Return a table of resets, or an empty table if the key is missing."""
         found = self._typed(key, dict, "a table of expressions", {})
         return {name: self.parsed(value, key, name, form=parse_reset) for name, value in found.items()}
 

@@ -157,7 +157,7 @@ def _refuse_spaces(rows: list[tuple[int, list[str]]], path: Path) -> None:
 
 
 def _is_split(row: list[str]) -> bool:
-    """Return whether each second cell of a row has only digits, and the cell before it a whole number."""
+    """Return whether cells of a row alternate between whole numbers and digits, as numbers with decimal commas do."""
     cells = [cell.strip() for cell in row]
     return all(cell.isdecimal() for cell in cells[1::2]) and all(
         cell.removeprefix("-").removeprefix("+").isdecimal() for cell in cells[::2]

@@ -36,7 +36,7 @@ class PartFiles:
 
     @property
     def files(self) -> tuple[str, ...]:
-        """The files that were read beside that of the model itself."""
+        """The files that were read in addition to the file of the model."""
         return (*self._models, *self.others)
 
     def model(self, table: Table, folder: Path) -> Model | None:
@@ -95,7 +95,7 @@ def read_uses(root: Table, folder: Path, files: PartFiles) -> Iterator[Use]:
 def _values(
     table: Table, field: str, repeat: int | None
 ) -> Iterator[tuple[str, tuple[IndexedExpression, ...]]]:
-    """Yield the names and values of a table; a table inside it gives names with dots, such as hub.x."""
+    """Yield the names and values of a table; a table inside this table gives names with dots, such as hub.x."""
     for keys, value in _leaves(table.mapping(field), ()):
         name = ".".join(keys)
         listed = value if isinstance(value, list) else [value]

@@ -1,4 +1,4 @@
-"""This module finds the expressions whose units disagree, words the messages, and lists what is known."""
+"""This module finds the expressions whose units disagree, writes the warnings, and lists the known units."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ def _is_in(unit: str) -> str:
 
 
 def unit_rows(model: Model) -> Iterator[tuple[str, str, str]]:
-    """Yield what has a unit, the unit, and how it is known: first the quantities, then the expressions.
+    """Yield the title, the unit and the source of the unit of each quantity, then of each expression.
 
     Expressions that are only numbers are left out.
     """

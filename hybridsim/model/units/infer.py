@@ -29,7 +29,7 @@ _OF_ALIKE = frozenset({"min", "max"})
 
 @dataclass(frozen=True)
 class Disagreement:
-    """Two units that differ: that of a term, and that of another term or the one that its place needs."""
+    """Two units that differ: the unit of a term, and the unit of another term or the required unit."""
 
     term: ast.expr
     unit: Unit
@@ -90,7 +90,7 @@ class Inference:
         return self.units.get(name)
 
     def _alike(self, nodes: Sequence[ast.expr]) -> Unit | None:
-        """Return the common unit of terms that are added or compared; the unit of most of them is right."""
+        """Return the common unit of terms that are added or compared: the unit that most of the terms have."""
         known = [(node, unit) for node in nodes if (unit := self.unit(node)) is not None]
         if not known:
             return None
@@ -215,7 +215,7 @@ def _is_one(number: ast.expr) -> bool:
 
 
 def _value(number: ast.expr) -> Fraction | None:
-    """Return the value of a number, or None if it has none."""
+    """Return the value of a number, or None if the value is undefined."""
     try:
         return Fraction(value_of(number, {})).limit_denominator(_DENOMINATOR)
     except (NoValue, OverflowError):

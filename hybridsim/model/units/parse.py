@@ -48,7 +48,7 @@ _TOKEN = re.compile(
 
 
 class _NotAUnit(ValueError):
-    """The text of a unit cannot be read."""
+    """Raised if the text of a unit cannot be read."""
 
 
 @cache
@@ -66,7 +66,7 @@ def read_unit(text: str) -> Unit | None:
 
 
 def write_unit(unit: Unit, preferred: Iterable[str] = ()) -> str:
-    """Return a unit as text: one of the preferred texts or of the usual ones, if any of them means this unit."""
+    """Return a unit as text: a preferred text or a usual text of this unit, if there is one."""
     if not unit.powers and unit.scale == 1.0:
         return "1"
     for text in (*preferred, *_SHOWN):
@@ -145,14 +145,14 @@ class _Reader:
             if text == "-" or (kind == "number" and self._tokens[self._at - 1][0] == "symbol"):
                 exponent = self._number()  # as in m s-1 and m2
         if symbol == "ms" and exponent < 0:
-            raise _NotAUnit("m s^-1 or 1/ms")
+            raise _NotAUnit("write the exponent of ms as m s^-1 or as 1/ms")
         return base.power(exponent)
 
     def _atom(self) -> Unit:
         if self._take("("):
             found = self._product()
             if not self._take(")"):
-                raise _NotAUnit("a parenthesis is open")
+                raise _NotAUnit("a parenthesis is not closed")
             return found
         kind, text = self._tokens[self._at] if self._at < len(self._tokens) else ("", "")
         self._at += 1
@@ -174,7 +174,7 @@ class _Reader:
         if self._take("/"):
             found /= self._number()
         if not self._take(")"):
-            raise _NotAUnit("a parenthesis is open")
+            raise _NotAUnit("a parenthesis is not closed")
         return found
 
     def _number(self) -> Fraction:

@@ -1,4 +1,4 @@
-"""This module collects the units that a model declares, with the unit of its time."""
+"""This module collects the units that a model declares, and the unit of time."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Quantities:
         return self.units.get(TIME)
 
     def inference(self, counts: bool = False) -> Inference:
-        """Return an empty inference that knows these units."""
+        """Return an inference that uses these units and has no results yet."""
         return Inference(self.units, self.parameters, counts)
 
     def rate(self, name: str) -> Unit | None:
@@ -52,7 +52,7 @@ class Quantities:
 
 
 def declared_quantities(model: Model) -> Quantities | None:
-    """Return the units that a model declares, and that of t, or None if it declares none."""
+    """Return the units that a model declares and the unit of t, or None if the model declares no unit."""
     texts = declared_texts(model)
     if not texts:
         return None
@@ -69,7 +69,7 @@ def declared_quantities(model: Model) -> Quantities | None:
 
 
 def declared_texts(model: Model) -> dict[str, str]:
-    """Return the units that a model declares; those of the states of friction laws follow from their equations."""
+    """Return the units that a model declares; units of the states of laws follow from the equations of the laws."""
     states = (state for state in model.states if not isinstance(state, ContactState))
     parts: tuple[Parameter | State | Discrete | Input, ...]
     parts = (*model.parameters, *states, *model.discrete, *model.inputs)
@@ -77,7 +77,7 @@ def declared_texts(model: Model) -> dict[str, str]:
 
 
 def _time_of(model: Model, known: Quantities) -> Unit | None:
-    """Return the unit of t that most rates of states and most declarations tell; s if they tell several equally."""
+    """Return the unit of t that follows from most rates and declarations, or s if several units are as frequent."""
     votes = []
     for state in model.states:
         rate = known.inference().unit(state.der.tree)

@@ -1,4 +1,4 @@
-"""This module lists the expressions of a model, each with the unit that its place needs."""
+"""This module lists the expressions of a model, each with the unit that is required of it."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _LENGTHS, _SPEEDS = (_METRE, ONE), (_METRE / _SECOND, ONE / _SECOND)  # the seco
 
 @dataclass(frozen=True)
 class Statement:
-    """An expression, its name for messages, and the unit that its place needs, if there is one."""
+    """An expression, its name for messages, and the unit that is required of it, if there is one."""
 
     what: str
     expr: Expression
@@ -91,7 +91,7 @@ def _rate(known: Quantities, what: str, expr: Expression, name: str) -> Statemen
 
 
 def _unless(known: Quantities, expr: Expression, kinds: Sequence[Unit]) -> Unit | None:
-    """Return the first of some units if an expression is known to have the dimension of none of them."""
+    """Return the first of some units if the known dimension of an expression differs from all of these units."""
     unit = known.inference().unit(expr.tree)
     is_one = unit is None or any(unit.dimension == kind.dimension for kind in kinds)
     return None if is_one else kinds[0]
@@ -133,7 +133,7 @@ def _of_contact(known: Quantities, contact: Contact, model: Model) -> Iterator[S
 
 
 def _is_of_load(known: Quantities, expr: Expression, load: Unit | None, required: Unit | None) -> bool:
-    """Return whether a force is a pure number times a load that is not in the unit of the force."""
+    """Return whether a force is a pure number times a load whose unit differs from the unit of the force."""
     if load is None or required is None or not load.differs(required):
         return False
     unit = known.inference().unit(expr.tree)
@@ -143,7 +143,7 @@ def _is_of_load(known: Quantities, expr: Expression, load: Unit | None, required
 def _of_law(
     known: Quantities, contact: Contact, model: Model
 ) -> Iterator[tuple[str, Expression, Unit | None, str]]:
-    """Yield the names and expressions of the forces and states of a law, each with the unit that it needs."""
+    """Yield the names and expressions of the forces and states of a law, each with the required unit."""
     law, name, force = contact.law, contact.name, known.units.get(contact.name)
     if law.is_set_valued:
         for backward in (False, True) if law.slip_backward or law.stick_backward else (False,):

@@ -81,7 +81,7 @@ ONE = Unit()
 
 
 def most_frequent(units: Sequence[Unit]) -> Unit:
-    """Return the unit that agrees with most of some units; of equally many the first."""
+    """Return the unit that agrees with most of some units, or the first of several such units."""
     return max(dict.fromkeys(units), key=lambda unit: sum(not unit.differs(other) for other in units))
 
 

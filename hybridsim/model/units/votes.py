@@ -24,7 +24,7 @@ _PASSES = 50
 
 
 def quantities_of(model: Model) -> Quantities | None:
-    """Return the declared and the inferred units of the names of a model, or None if it declares none."""
+    """Return the declared and the inferred units of the names of a model, or None if no unit is declared."""
     known = declared_quantities(model)
     if known is None:
         return None
@@ -45,7 +45,7 @@ def quantities_of(model: Model) -> Quantities | None:
 
 @dataclass(frozen=True)
 class _Use:
-    """An expression, and what its unit follows from: a state of which it is the rate, a name, or a label."""
+    """An expression, and the source of its unit: the state of which it is the rate, a name, or a label."""
 
     expr: Expression
     rate_of: str = ""
@@ -53,14 +53,14 @@ class _Use:
     label: str = ""
 
     def required(self, known: Quantities) -> Unit | None:
-        """Return the unit that the expression needs, or None if it is unknown."""
+        """Return the unit that the expression needs, or None if the unit is unknown."""
         if self.rate_of:
             return known.rate(self.rate_of)
         return known.units.get(self.value_of) if self.value_of else read_unit(self.label)
 
 
 def _uses(model: Model) -> Iterator[_Use]:
-    """Yield the expressions that tell the unit of a name in them."""
+    """Yield the expressions that determine the unit of a name that occurs in the expression."""
     yield from (_Use(state.der, rate_of=state.name) for state in model.states)
     yield from (_Use(expr, value_of=name) for name, expr in model.definitions)
     yield from (_Use(output.expr, label=output.unit) for output in model.outputs)
@@ -70,7 +70,7 @@ def _uses(model: Model) -> Iterator[_Use]:
 
 
 class _Witnesses:
-    """The expressions that tell the units of names: those that set a name, and those that use it."""
+    """The expressions that determine units of names: expressions that set a name, and expressions that use a name."""
 
     def __init__(self, model: Model, known: Quantities) -> None:
         self.known = known
@@ -87,7 +87,7 @@ class _Witnesses:
         self.names = [*dict.fromkeys((*self.setting, *self.rates, *model.variables()))]
 
     def unit(self, name: str) -> Unit | None:
-        """Return the unit that most expressions tell for a name; of equally many the first."""
+        """Return the unit of a name that follows from most expressions, or the first of several such units."""
         votes = [*self._votes(name)]
         return most_frequent(votes) if votes else None
 
@@ -137,7 +137,7 @@ def _resets(model: Model) -> Iterator[Mapping[str, Expression]]:
 
 
 def _solved(known: Quantities, node: ast.expr, required: tuple[Unit, ...], name: str) -> Iterator[Unit]:
-    """Yield units that a name must have for an expression to have each of some units, and to fit the terms of sums."""
+    """Yield the units of a name for which an expression has one of the given units and the terms of sums agree."""
     match node:
         case ast.Name(id=own) if own == name:
             yield from required

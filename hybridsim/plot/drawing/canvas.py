@@ -118,7 +118,7 @@ class Canvas:
 
 
 def _unit_of(model: Model) -> str:
-    """Return the common unit of the states that are coordinates of shapes, or an empty text without one."""
+    """Return the common unit of the states that are coordinates of shapes, or an empty text if there is none."""
     states = {state.name: state.unit for state in model.states}
     coordinates = [expr.text for shape in model.drawing for expr in (shape.at or ())]
     found = {states[name] for name in coordinates if name in states}

@@ -185,7 +185,7 @@ def _rod(pose: Pose, frame: Frame) -> Items:
 
 
 def _shaft(pose: Pose, frame: Frame) -> Items:
-    """Draw a shaft from the side, with lines on its surface that show how it is twisted."""
+    """Draw a shaft from the side, with lines on its surface that show its twist."""
     start, end = ends_of(pose, frame.poses, frame.layout)
     length, radius = float(np.hypot(*(end - start))), frame.layout.size(pose)[0] / 2
     first, twist = pose.number("angle"), pose.number("twist")

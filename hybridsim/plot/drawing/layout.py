@@ -128,7 +128,7 @@ def _span(name: str, poses: Sequence[Poses], layout: Layout, bodies: Sequence[Po
 
 
 def direction_of(pose: Pose) -> Points:
-    """Return the direction of a ground, wall or belt; at angle 0, a wall points upwards and others to the right."""
+    """Return the direction of a ground, wall or belt; at angle 0, a wall points upwards, the others to the right."""
     angle = pose.number("angle") + (np.pi / 2 if pose.shape.kind == "wall" else 0.0)
     return np.array([np.cos(angle), np.sin(angle)])
 

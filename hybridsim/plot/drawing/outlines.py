@@ -64,7 +64,7 @@ def rectangle(low: Points, width: float, height: float, radius: float = 0.0) -> 
 
 
 def along(start: Points, end: Points, points: Points) -> Points:
-    """Return points (s, n) in the frame of a line: s along it from its start, n to its left."""
+    """Return points (s, n) in the frame of a line: s runs along the line from its start, n points to its left."""
     direction = _unit(end - start)
     normal = np.array([-direction[1], direction[0]])
     return np.asarray(start + points[:, :1] * direction + points[:, 1:] * normal)
@@ -91,7 +91,7 @@ def hatching(start: Points, end: Points, depth: float) -> list[Points]:
 
 
 def on_outline(centre: Points, direction: Points, outline: Points) -> Points:
-    """Return the point at which a ray from inside an outline leaves it, or the start of the ray if it never leaves."""
+    """Return the point at which a ray from inside an outline crosses the outline, or else the start of the ray."""
     first, second = outline, np.roll(outline, -1, axis=0)
     edge, to_first = second - first, first - centre
     across = direction[0] * edge[:, 1] - direction[1] * edge[:, 0]

@@ -84,7 +84,7 @@ Promise.all([load(still), ...parts.map(part => load(part[2]))]).then(([first, ..
 
 
 def page(title: str, pictures: Sequence[Image.Image], fps: float, is_dark: bool) -> str:
-    """Return a page that plays pictures; of each picture, only the part that differs from the first one is stored."""
+    """Return a page that plays pictures. After the first picture, only the changed part of each picture is stored."""
     first, theme = pictures[0], DARK if is_dark else LIGHT
     still, clear = np.asarray(first), len(first.getpalette() or []) // 3
     parts: list[list[int | str]] = []

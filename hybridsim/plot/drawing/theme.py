@@ -58,7 +58,7 @@ def darken(figure: Figure) -> None:
 
 
 def _changed(colour: Any) -> Any:
-    """Return the dark colours for light ones, or None if no colour changes."""
+    """Return the dark colours that replace light colours, or None if no colour changes."""
     try:
         colours = to_rgba_array(colour)
     except (TypeError, ValueError):

@@ -12,7 +12,7 @@ import math
 
 
 def equivalent_viscous_amplitude(r: float, zeta: float, f: float) -> float:
-    """Return the amplitude A in F0/k; 0 if friction is too large for a vibration (f >= pi/4)."""
+    """Return the amplitude A in F0/k, or 0 if friction is too large for a vibration (f >= pi/4)."""
     drag = 4.0 * f / math.pi
     if drag >= 1.0:
         return 0.0

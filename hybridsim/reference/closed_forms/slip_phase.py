@@ -75,7 +75,7 @@ class SlipPhase:
         return own + abs(self.response) * self.frequency**n
 
     def time_to_rest(self, horizon: float) -> float | None:
-        """Return the first s > 0 at which the velocity is zero, or None if it is beyond the horizon.
+        """Return the first s > 0 at which the velocity is zero, or None if this time is beyond the horizon.
 
         While the body moves, v + v' h - bound h^2 / 2 is a lower bound of the velocity. A step to the zero of
         this bound therefore passes no zero of the velocity, and near the first zero it becomes Newton's step.

@@ -35,7 +35,7 @@ class Motion:
     last: tuple[Number, ...] = ()
 
     def __call__(self, times: NDArray[np.float64], side: str = "+") -> NDArray[np.float64]:
-        """Return states (n, k) at times (k,); at an event, "+" gives the state after it and "-" the state before.
+        """Return states (n, k) at times (k,); at an event, "+" gives the state after and "-" the state before it.
 
         The segment is chosen by times rounded to doubles, like the times of the events.
         """

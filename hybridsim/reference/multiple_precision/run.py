@@ -198,7 +198,7 @@ class Run:
     def _pass_monitors(
         self, expansion: Expansion, t: Number, s: Number, arriving: bool
     ) -> tuple[list[int], Number]:
-        """Record monitors that change sides before a time; return the first that affects the run."""
+        """Record monitors that change sides before a time; return the first monitor that affects the run."""
         seen: list[tuple[Number, int, int]] = []
         tolerance = self.precision.zero * s
         for k, quantity in enumerate(expansion.monitors):

@@ -108,7 +108,7 @@ class Rules:
         )
 
     def _leaving(self, point: Point, modes: Modes) -> set[tuple[int, int]]:
-        """Return the guards that are negative just after an event, except those of corners and loads."""
+        """Return the guards that are negative just after an event, except the guards of corners and loads."""
         return self.sides.others(self.programs.leaving(self.programs.expand(point, modes)))
 
     def _cancelled(self, point: Point, modes: Modes, fired: set[tuple[int, int]]) -> set[tuple[int, int]]:
@@ -167,8 +167,8 @@ class Rules:
             if len(chosen) > _MAX_JOINT_CONTACTS:
                 coupled = ", ".join(self.components[c].name for c in chosen)
                 raise UsageError(
-                    f"{len(chosen)} coupled contacts start or stop at once ({coupled}); the multiple-precision run "
-                    f"supports at most {_MAX_JOINT_CONTACTS}",
+                    f"{len(chosen)} coupled contacts start or stop at once ({coupled}); the "
+                    f"multiple-precision run supports at most {_MAX_JOINT_CONTACTS} contacts",
                     remedy="use reference='runs'",
                 )
             point = self.programs.program(self.programs.held(self.programs.decided(modes), chosen)).project(
@@ -187,7 +187,7 @@ class Rules:
         return expansion.is_zero(expansion.surfaces[self._surfaces().index(c)])
 
     def _with_coupled(self, first: int, deciding: set[int], point: Point, modes: Modes) -> list[int]:
-        """Return a component and the undecided or holding components to which forces couple it."""
+        """Return a component with the undecided or holding components that are coupled to it by forces."""
         together = [c for c in self._surfaces() if c in deciding or self._holds(c, modes)]
         program = self.programs.program(self.programs.held(self.programs.decided(modes), together))
         program.begin(point)

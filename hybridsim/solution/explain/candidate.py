@@ -1,4 +1,4 @@
-"""This module describes the combinations of modes that a decision judged, and the guards."""
+"""This module describes the guards, and the combinations of modes that a decision judged."""
 
 from __future__ import annotations
 

@@ -136,7 +136,7 @@ def explain(solution: Solution, number: int | Event) -> Explanation:
 def _explained(
     solution: Solution, event: Event, occurrence: Occurrence, together: list[Occurrence]
 ) -> Explanation:
-    """Return the explanation without remarks; `together` contains the records of all events of its instant."""
+    """Return the explanation without remarks; `together` contains the records of all events of the same instant."""
     if event.kind == "near-grazing":
         near, why = grazed(solution, occurrence), _of_another_kind(solution, event, occurrence)
         return Explanation(event, near, (), why, _state(solution, event))
@@ -269,7 +269,7 @@ def _with_unit(value: float, unit: str) -> str:
 
 
 def _taken(solution: Solution, event: Event, at: Situation) -> tuple[tuple[Choice, ...], int]:
-    """Return the choices of the guard that fired, and the index of the chosen one."""
+    """Return the choices of the guard that fired, and the index of the choice that was taken."""
     component = next((c for c in solution.components if c.name == event.component), None)
     mode = next((m for m in component.modes if m.name == event.source), None) if component else None
     guard = next((g for g in mode.guards if g.name == event.guard), None) if mode else None
@@ -282,7 +282,7 @@ def _taken(solution: Solution, event: Event, at: Situation) -> tuple[tuple[Choic
 
 
 def _choices(solution: Solution, event: Event, at: Situation) -> tuple[str, ...]:
-    """Describe the choices of the guard that fired: conditions, their values, and the outcome."""
+    """Describe the choices of the guard that fired: conditions, the values of the conditions, and the outcome."""
     then, taken = _taken(solution, event, at)
     if len(then) < 2:
         return ()
@@ -329,7 +329,7 @@ def _segment_before(solution: Solution, occurrence: Occurrence) -> Segment | Non
     if solution._save != "all":
         raise UsageError(
             f"the run was made with keep={solution._save!r}",
-            remedy="simulate it with keep='all' to explain events",
+            remedy="repeat the run with keep='all' to explain events",
         )
     segments = solution._segments
     last = int(np.searchsorted(solution._of_model.frame.starts, float(occurrence.instant), side="right"))

@@ -30,7 +30,7 @@ def way_of_monitor(solution: Solution, event: Event, occurrence: Occurrence) -> 
 
 
 def _side_after(solution: Solution, occurrence: Occurrence) -> int | None:
-    """Return the side of a monitor just after an instant, or None if no motion is known there."""
+    """Return the side of a monitor just after an instant, or None if the motion after the instant is unknown."""
     last = int(np.searchsorted(solution._of_model.frame.starts, float(occurrence.instant), side="right")) - 1
     if last < 0:
         return None

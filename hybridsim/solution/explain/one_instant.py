@@ -25,7 +25,7 @@ BY_RESET = (
 
 
 def at_same_instant(occurrences: Sequence[Occurrence], k: int) -> list[Occurrence]:
-    """Return the records of all events at the instant of the k-th one, in their order."""
+    """Return the records of all events at the instant of the k-th event, in order."""
     first, last = k, k + 1
     while first > 0 and occurrences[first - 1].instant == occurrences[k].instant:
         first -= 1
@@ -37,7 +37,7 @@ def at_same_instant(occurrences: Sequence[Occurrence], k: int) -> list[Occurrenc
 def fired_guards(
     system: System, segment: Segment, together: list[Occurrence], method: Integrator
 ) -> list[int]:
-    """Return the numbers of the guards that reached zero at one instant, in the modes just before it.
+    """Return the numbers of the guards that reached zero at one instant, in the modes just before the instant.
 
     Guards that another event of this instant moved are left out: they are not at zero at the end of the
     segment.

@@ -123,7 +123,7 @@ class RecordedResolution(EventResolution):
         return found
 
     def decision_of(self, component: int, number: int) -> Decision | None:
-        """Return the decision that caused the change with a given number, or None if no decision did."""
+        """Return the decision that caused the change with a given number, or None if the change has another cause."""
         for decision in self.decisions:
             if component in decision.components and number < decision.last:
                 return decision if decision.first <= number else None

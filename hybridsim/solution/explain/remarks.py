@@ -160,7 +160,7 @@ def _loads(solution: Solution, t: float) -> Iterator[str]:
 
 
 def _load(solution: Solution, contact: Contact, t: float) -> float | None:
-    """Return the normal load of a contact at a time, or None if its expression has no value there."""
+    """Return the normal load of a contact at a time, or None if the load has no value at this time."""
     model = solution.model
     trees = {name: expr.tree for name, expr in model.definitions}
     values, open_ = dict(model.parameter_values()), set(names_of(contact.normal.tree))

@@ -103,7 +103,7 @@ def _is_of(system: System, change: Change | None, occurrence: Occurrence) -> boo
 
 
 class _Instant:
-    """An instant of a run, with the segment that ended there and the records made there."""
+    """An instant of a run, with the segment that ended at the instant and the records of the instant."""
 
     def __init__(self, run: Run, segment: Segment, together: Sequence[Occurrence]) -> None:
         self.system, self.task, self.segment, self.together = run.system, run.task, segment, together
@@ -174,7 +174,7 @@ class _Instant:
     def _settled(
         self, found: Located, monitors: Sequence[int], schedules: Sequence[int], begins: bool = False
     ) -> Stage:
-        """Choose the modes of one stage; `begins` says whether inputs change their pieces there."""
+        """Choose the modes of one stage; `begins` is true if inputs change their pieces at this stage."""
         system, model, at = self.system, self.system.model, found.at
         keys = [("monitor", k) for k in monitors] + [("schedule", k) for k in schedules]
         before = Situation(at.s, at.x.copy(), at.p.copy(), at.z.copy(), at.x_error.copy(), at.s_error)

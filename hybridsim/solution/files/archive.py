@@ -172,7 +172,7 @@ def _read(file: IO[bytes], name: str) -> Solution:
         raise UsageError(
             f"{name} has file version {header.get('version')!r}, written by hybridsim {header.get('hybridsim')}; "
             f"this hybridsim reads version {VERSION}",
-            remedy="read it with the version of hybridsim that wrote it",
+            remedy="read the file with the version of hybridsim that wrote it",
         )
     if seal != _digest(text, arrays):
         raise UsageError(f"{name} is damaged: its content does not match its checksum", remedy=_REMEDY)

@@ -127,7 +127,7 @@ def loosened(tolerances: tuple[float, float], setting: Setting) -> tuple[float, 
 
 
 def seen_by(scene: Scene, configuration: Configuration) -> Scene:
-    """Return the scene as a method can solve it; for regularized contacts, modes are not compared."""
+    """Return the scene in the form that a method can solve; for regularized contacts, modes are not compared."""
     if not configuration.form:
         return scene
     truth = scene.truth

@@ -1,4 +1,4 @@
-"""A common workaround: ignore all guards for a short time after each event, so that none fires twice."""
+"""A common workaround: ignore all guards for a short time after each event, so that no guard fires twice."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class _Blind(NativeStepper):
         return self._blinded(super()._monitor(number))
 
     def _blinded(self, event: Any) -> Callable[[float, np.ndarray], float]:
-        """Return an event function that keeps one sign during the cooldown, so that it cannot fire."""
+        """Return an event function that keeps one sign during the cooldown, so that the guard cannot fire."""
         far = 1.0 if event.direction > 0 else -1.0
 
         def blinded(s: float, x: np.ndarray) -> float:

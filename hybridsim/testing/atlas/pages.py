@@ -157,7 +157,7 @@ def page(result: Atlas, trouble: str, scenes: list[Scene], pictures: Collection[
 
 
 def _overall(result: Atlas) -> str:
-    """Return how many scenes there are, and which methods are right in all of them."""
+    """Return a sentence on the number of scenes and on the methods that are right in all scenes."""
     right = [
         f"`{one.name}`"
         for one in result.configurations
@@ -217,7 +217,7 @@ def _by_reason(cells: list[Cell]) -> dict[str, list[str]]:
 
 
 def _with_error(cell: Cell) -> str:
-    """Return a method's name with its error and, if visible, its order of convergence."""
+    """Return a method's name with its error, and with its order of convergence if the order is visible."""
     known = []
     if cell.error is not None and cell.rows:
         known.append(f"{cell.error:.0e}")

@@ -1,4 +1,4 @@
-"""Scenes of events at one instant: coinciding guards, flat guards, resets onto guards, the end of a run."""
+"""Scenes of events at one instant: coinciding guards, flat guards, resets onto guards, and ends of runs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Scenes of flows with corners: no event is reported, and the accuracy is that of a smooth flow."""
+"""Scenes of flows with corners: no event is reported, and the accuracy is as high as in a smooth flow."""
 
 from __future__ import annotations
 

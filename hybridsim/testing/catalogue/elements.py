@@ -16,7 +16,7 @@ def scenes() -> tuple[Scene, ...]:
 
 
 def _transitions(component: str, expected: Sequence[tuple[float, str]], within: float = 1e-3) -> Check:
-    """Return a check that a component changes its mode at the expected times, roughly, and at no others."""
+    """Return a check that a component changes its mode near the expected times, and at no other times."""
 
     def check(solution: Any) -> list[str]:
         found = [(event.t, event.target) for event in solution.events if event.component == component]
@@ -87,7 +87,7 @@ def _elements() -> Scene:
 
 
 def _delays() -> Scene:
-    """Return the scene of delayed signals: on (k, k + 1) the sample is sin(k - 1), and 0 on (0, 1)."""
+    """Return the scene of delayed signals: the sample is 0 on (0, 1), and sin(k - 1) on (k, k + 1)."""
     samples = sum(math.sin(k - 1) for k in range(1, 10))
     states = ((3.0, (math.sin(3.0), math.cos(3.0), math.sin(1.0), 1.0, 0.5)),)
     return Scene(

@@ -16,7 +16,7 @@ def scenes() -> tuple[Scene, ...]:
 
 
 def grazing() -> tuple[Scene, ...]:
-    """Return scenes of sin(t) with threshold 1 + 1e-6 (no event) and 1 - 1e-6 (above it for 2.8e-3 at each maximum)."""
+    """Return scenes of sin(t) with threshold 1 + 1e-6, without events, and 1 - 1e-6, with two crossings per maximum."""
     gap = 1e-6
     half = math.acos(1 - gap)
     tops = [math.pi / 2 + 2 * math.pi * n for n in range(3)]
@@ -116,7 +116,7 @@ def modes() -> tuple[Scene, ...]:
 
 
 def monitored() -> tuple[Scene, ...]:
-    """Return scenes of monitors: directed, several roots per step, at t0, at step ends, with output grids."""
+    """Return scenes of monitors: directed, with several roots per step, at t0, at step ends, and with output grids."""
     zeros = ((-6.0, "zero"), (-2.0, "zero"), (2.0, "zero"))
     sides = ((-6.0, "mode:above"), (-2.0, "mode:below"), (2.0, "mode:above"))
     values = ((-7.0, (-45.0,)), (0.0, (-24.0,)), (4.0, (120.0,)))

@@ -98,7 +98,7 @@ def _never_crossed(solution: Any) -> list[str]:
 
 
 def _samples() -> Scene:
-    """Return the scene of a sine that is sampled whenever it has changed by 2, also at its extremes.
+    """Return the scene of a sine that is sampled at each change by 2, and also at its extremes.
 
     Whether these touches are sampled is open, and with them the first level on the way back.
     """

@@ -20,7 +20,7 @@ def scenes() -> tuple[Scene, ...]:
 
 
 def _swing(name: str, periods: float, **changes: Any) -> Scene:
-    """Return the scene of an oscillator from rest over some periods of its force, from the closed form."""
+    """Return the scene of an oscillator that starts from rest, with its closed form over some forcing periods."""
     p = {"m": 1.0, "c": 0.0, "k": 1.0, "Fs": 0.3, "Fk": 0.3, "F0": 1.0, "w": 1.0, **changes}
     unit = 2 * math.pi / p["w"]
     span = (0.0, periods * unit)

@@ -357,7 +357,7 @@ DATA = {"t": [0.0, 1.0, 2.0], "x": [1.0, 1.5, 2.0]}
         (DATA, {}, {}, "a dict of names and bounds"),
         (DATA, {"a": hs.Unknown(-math.inf, 0.1)}, {}, "guess="),
         (DATA, {"a": (-math.inf, 1)}, {"starts": 3}, "no finite bounds"),
-        (DATA, {"a": (0, 1)}, {"noise": {"v": 1}}, "no record has"),
+        (DATA, {"a": (0, 1)}, {"noise": {"v": 1}}, "no record contains 'v'"),
         (DATA, {"a": (0, 1)}, {"noise": {"x": -1}}, "positive number"),
         (DATA, {"a": (0, 1)}, {"loss": "square"}, "soft_l1"),
         (DATA, {"a": (0, 1)}, {"colour": 1}, "'colour' is not an option"),

@@ -59,7 +59,11 @@ y = {{ {element} }}
             "component with modes",
         ),
         ('kind = "backlash", input = "x + w", width = 1', "depends on w", ""),
-        ('kind = "delay", input = "x", time = 0.1', "a model keeps no past of states", "`clock` and `ticks`"),
+        (
+            'kind = "delay", input = "x", time = 0.1',
+            "a model does not store past states",
+            "`clock` and `ticks`",
+        ),
         ('kind = "delay", input = "w", time = 0.1', "'w' cannot be delayed", "'table' and 'wave'"),
         ('kind = "delay", input = "x", clock = "tack", ticks = 2', "unknown clock 'tack'", "tick"),
         ('kind = "delay", input = "x", ticks = 2', "the delay is not known", "`clock` and `ticks`"),

@@ -145,7 +145,7 @@ def test_fractional_powers_are_flagged() -> None:
     assert "sqrt(1 + v**2)" not in found
     assert "x**k" not in found  # k is 2
     raised = moving("abs(x)**k").with_(k=1.5)
-    assert accounts(raised)["abs(x)**k"].remark == "it has no series where abs(x) = 0"
+    assert accounts(raised)["abs(x)**k"].remark == "the power has no Taylor series where abs(x) = 0"
 
 
 def test_names_do_not_clash() -> None:
@@ -158,4 +158,4 @@ def test_mode_remarks_name_the_component() -> None:
     contact = hs.Contact("f", "v", "1", "coulomb", {"mu": 0.5})
     account = accounts(moving("-x - f - abs(v)", contacts=[contact]))["abs(v)"]
     assert (account.became, account.where) == (MODE, ("state v",))
-    assert account.remark == "its side follows from the modes of f"
+    assert account.remark == "the modes of f determine the side"

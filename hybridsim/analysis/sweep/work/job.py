@@ -1,4 +1,4 @@
-"""This module runs the points of a sweep: it sets the model, measures it, and catches errors."""
+"""This module runs the points of a sweep: it sets parameters, measures the model, and catches errors."""
 
 from __future__ import annotations
 

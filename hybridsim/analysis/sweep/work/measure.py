@@ -27,7 +27,7 @@ def work(
     progress: Progress | None,
     journal: Journal | None = None,
 ) -> tuple[Collected, bool, str]:
-    """Run all points; return the results, whether they are complete, and the name of the executor.
+    """Run all points; return the results, whether all points were run, and the name of the executor.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""This module refuses derivatives at points where an expression has none, and names the expression."""
+"""This module refuses derivatives at points where an expression is not differentiable, and names the expression."""
 
 from __future__ import annotations
 

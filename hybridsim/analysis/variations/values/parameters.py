@@ -59,7 +59,7 @@ def expression_slope(
 
 
 def _derivative(expression: Expression, name: str, values: Mapping[str, float]) -> float:
-    """Return the derivative of an expression by one name; at a kink or root, its limit from both sides."""
+    """Return the derivative of an expression by one name; at a kink or root, return the limit from both sides."""
     found = _slope(expression, name)
     if not any(is_at_edge(node, values) for node in ast.walk(expression.tree) if isinstance(node, ast.expr)):
         return evaluate(found, values)

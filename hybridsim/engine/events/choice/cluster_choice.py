@@ -32,7 +32,7 @@ def with_tied(system: System, members: list[int]) -> list[int]:
 
 
 def together(system: System, members: list[int], candidates: np.ndarray) -> np.ndarray:
-    """Return the candidates in which a gap and the friction along it are both held, or neither is held.
+    """Return the candidates in which a gap and the friction along the gap are both held or both free.
 
     If their velocities differ (a stop beside a belt), candidates in which both hold are removed.
     """

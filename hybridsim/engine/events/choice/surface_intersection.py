@@ -52,7 +52,7 @@ def is_one_motion(resolution: EventVerdicts, members: list[int], candidates: np.
 
 
 def on_its_side(resolution: EventVerdicts, members: list[int], candidates: np.ndarray) -> int:
-    """Return the number of the first candidate whose motion agrees with its sides of all surfaces, or 0.
+    """Return the number of the first candidate whose motion agrees with its sides of all surfaces, or 0 if none does.
 
     A body at rest may slip either way within rounding. Its holding mode leaves it a speed, or a rate, of some sign.
     """
@@ -72,7 +72,7 @@ def on_its_side(resolution: EventVerdicts, members: list[int], candidates: np.nd
 
 
 def keeps_nothing(resolution: EventVerdicts, members: list[int], z: np.ndarray) -> str:
-    """Return why a motion along several surfaces may not be unique, or an empty text if it is unique."""
+    """Return why a motion along several surfaces may not be unique, or an empty text if the motion is unique."""
     automata = resolution.system.automata
     sliding = [c for c in members if automata[c].is_unique and z[c] == automata[c].hold]
     if len(sliding) < 2:

@@ -117,7 +117,7 @@ def errors_at_known_time(model: Any, loop: Any, s: float, steps: int, state: Any
 
 @inlined
 def apply_resets(loop: Any, kind: int, state: Any, work: Any) -> bool:
-    """Write the discrete states after the resets of a kind to p_after; return False if one is not finite.
+    """Write the discrete states after the resets of a kind to p_after; return False if a state is not finite.
 
     All resets read the values before, with the inputs after the known time. They set different discrete states.
     """
@@ -154,7 +154,7 @@ def needs_choice(automata: Any, z: Any, has_resets: bool) -> bool:
 
 
 def resolve_known_time(model: Any, loop: Any, state: Any, work: Any, k: int, s: float, steps: int) -> int:
-    """Resolve the next known time and replace the state; return 1, or 0 if the general loop has to do it.
+    """Resolve the next known time and replace the state; return 1, or 0 if the general loop has to resolve the time.
 
     k: row of the modes. s, steps: local time, and number of steps, of the segment that ends there, at the states in the
     work space.

@@ -28,7 +28,7 @@ def _zeros_of(automata: Any, c: int, g: int, zeros: int) -> int:
 
 @inlined
 def _clear_verdict(automata: Any, tapes: Any, lin: Any, k: int, c: int, zeros: int, work: Any) -> int:
-    """Return the verdict on the trial modes of row `k` if it is clear, otherwise UNDECIDED."""
+    """Return the verdict on the trial modes of row `k` if the verdict is clear, otherwise UNDECIDED."""
     found = FINE
     for i in range(tapes.active_start[k], tapes.active_start[k + 1]):
         short_loop()

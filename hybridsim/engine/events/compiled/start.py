@@ -1,4 +1,4 @@
-"""This module chooses the modes of contacts at the start of a run in compiled code, if they are certain.
+"""This module chooses the modes of contacts at the start of a run in compiled code, if the modes are certain.
 
 The rules are those of `hybridsim.engine.events.resolve`, which resolves the other cases and reports problems.
 """
@@ -97,7 +97,7 @@ def _take_sides(automata: Any, inputs: Any, surfaces: Any, pin_at: int, state: A
 def _choose_cluster(
     automata: Any, tapes: Any, inputs: Any, none: Any, state: Any, first: int, work: Any
 ) -> bool:
-    """Choose the modes of a cluster's components on their surfaces; return whether they are certain."""
+    """Choose the modes of a cluster's components on their surfaces; return whether the modes are certain."""
     x, x_error, z, p = state.x, state.x_error, state.z, state.p
     members, current, holds, trial, y = work.members, work.current, work.holds, work.trial, work.y
     cluster = cluster_of(automata, first)

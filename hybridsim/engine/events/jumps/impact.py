@@ -76,7 +76,7 @@ class _Collision:
         self.rates = dict.fromkeys(mine, 0.0)
 
     def run(self) -> tuple[Failure | None, bool]:
-        """Compute the impact; return why the run ends, or None, and whether there was an impact."""
+        """Compute the impact; return the reason why the run ends, or None, and whether there was an impact."""
         failure = self._measure()
         if failure:
             return failure, False

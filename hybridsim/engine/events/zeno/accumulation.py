@@ -284,7 +284,7 @@ class Accumulation:
         return None
 
     def _shared(self, time: float, first: int) -> Limit:
-        """Return the limit with all components whose events accumulate at it."""
+        """Return the limit with all components whose events accumulate at this limit."""
         among = {first}
         for c in self.under_way:
             forecast = self.paces[c].forecast

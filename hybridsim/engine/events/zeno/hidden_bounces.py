@@ -67,7 +67,7 @@ def bounces_of(outcome: Outcome, now: Instant, x_minus: np.ndarray) -> dict[int,
 
 
 def last_bounces(system: System, happened: Sequence[Occurrence]) -> dict[int, Bounce]:
-    """Return the last recorded event as bounces of its components; empty for a schedule or a clock tick."""
+    """Return the last recorded event as bounces of its components, or no bounces for a schedule or a clock tick."""
     last = next((o for o in reversed(happened) if o.kind != "monitor"), None)
     components = [
         c for c, automaton in enumerate(system.automata) if last and automaton.name == last.component
@@ -120,7 +120,7 @@ def _barely_seen(system: System, outcome: Outcome, bounces: dict[int, Bounce]) -
 def _agreed(
     system: System, outcome: Outcome, c: int, best: _Forecast, speed: float, last: Bounce, record: Trajectory
 ) -> tuple[float, int]:
-    """Return the earliest forecast that agrees with all later ones, and the number of these forecasts."""
+    """Return the earliest forecast that agrees with all later forecasts, and the number of forecasts that agree."""
     count = 1
     for bounce in _backward(system.automata[c], last, record):
         departure = _departure(system, outcome, c, bounce)
@@ -166,7 +166,7 @@ def _forecast(
 
 
 def _backward(automaton: Automaton, last: Bounce, record: Trajectory) -> Iterator[Bounce]:
-    """Yield the earlier bounces of a component, backward in time, until it was in its holding mode."""
+    """Yield the earlier bounces of a component, backward in time, until the component was in its holding mode."""
     blocks = reversed(record.occurrences.blocks)
     events = (block[i] for block in blocks for i in range(len(block) - 1, -1, -1))
     for o in islice(events, LOOKED_BACK_ON):

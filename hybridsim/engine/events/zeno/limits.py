@@ -111,7 +111,7 @@ def _held_at(
 def _at_the_end(
     system: System, start: np.ndarray, p: np.ndarray, z: np.ndarray, s: float, apart: Collection[int]
 ) -> np.ndarray | None:
-    """Return the state at local time `s`, or None if it is inaccurate or another event may come before."""
+    """Return the state at local time `s`, or None if the state is inaccurate or another event may come first."""
     with np.errstate(over="ignore", invalid="ignore"):
         whole = _moved(system, start, p, z, 0.0, s)
         halves = _moved(system, _moved(system, start, p, z, 0.0, 0.5 * s), p, z, 0.5 * s, s)

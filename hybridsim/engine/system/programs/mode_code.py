@@ -51,7 +51,7 @@ def mode_tape(system: System, z: np.ndarray) -> ModeTape:
 
 
 def _holding(system: System, z: np.ndarray) -> Iterator[int]:
-    """Yield the registers of the condition that held states follow from constraints, which is true in every mode."""
+    """Yield the registers of a condition that is true in every mode: held states follow from constraints."""
     tape = system.code.data["tape"]
     zeros = [register for register, value, _ in tape["constants"] if value == 0.0]
     pins = [register for register, source in tape["parameters"] if source == system.layout.pin_at]

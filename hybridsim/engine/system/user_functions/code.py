@@ -119,7 +119,7 @@ class PythonCode:
         return compiled
 
     def last_failure(self) -> str:
-        """Return the last exception of a run as text, or an empty text, and clear it."""
+        """Return the last exception of a run as text, or an empty text, and clear the exception."""
         if self._compiler is not None and not self.refused:
             self._compiler.replay(self.forms.failures)
         last, self.forms.failures.last = self.forms.failures.last, ""

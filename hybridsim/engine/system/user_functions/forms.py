@@ -156,7 +156,7 @@ class Forms:
 
 
 def rates(function: Function, count: int, t: float, x: np.ndarray, p: Any) -> np.ndarray:
-    """Return the result of a flow as an array; raise an error if it is not n numbers."""
+    """Return the result of a flow as an array; raise an error if the result is not n numbers."""
     returned = function(t, x, p)
     found = _array(returned)
     if found is None or found.shape != (count,):
@@ -168,7 +168,7 @@ def rates(function: Function, count: int, t: float, x: np.ndarray, p: Any) -> np
 
 
 def number(function: Function, t: float, x: np.ndarray, p: Any) -> float:
-    """Return the result of a scalar function; raise an error if it is not a number."""
+    """Return the result of a scalar function; raise an error if the result is not a number."""
     returned = function(t, x, p)
     found = _array(returned)
     if found is None or found.shape != ():

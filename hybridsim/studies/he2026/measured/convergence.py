@@ -55,7 +55,7 @@ class Curves:
         return float(self.settings[first]) if first < len(self.settings) - 1 else float("nan")
 
     def off(self, method: str, case: str, setting: float) -> float:
-        """Return the relative deviation of A from the exact value at the setting nearest to the given one."""
+        """Return the relative deviation of A from the exact value, at the setting that is nearest to a given one."""
         nearest = int(np.argmin(np.abs(np.log(np.array(self.settings) / setting))))
         return float(abs(self.values[method][case][0, nearest] / self.exact[case][0] - 1.0))
 

@@ -128,7 +128,7 @@ def solve_by_steps(
 
 
 def periods_of(solution: Solution, point: paper.Point, periods: int, last: int) -> Periods:
-    """Return A and E of each period from the values at the steps, as in the paper."""
+    """Return A and E of each period from the values at the steps, in the way of the paper."""
     t, (x, v) = solution.t, solution.y
     edges = point.period * np.arange(periods - last, periods + 1)
     first = np.searchsorted(t, edges[:-1] - 1e-9 * point.period)

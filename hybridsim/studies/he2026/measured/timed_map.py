@@ -68,7 +68,7 @@ class TimedMap:
 
 
 def time_map(size: Size, pool: Pool) -> TimedMap:
-    """Time all methods on the same threads: `exact` on the whole map, the others at random points."""
+    """Time all methods on the same threads: `exact` on the whole map, the other methods at random points."""
     side = size.timed_count
     grid = [
         [Point(float(r), float(q)) for r in np.linspace(*R_SPAN, side)]

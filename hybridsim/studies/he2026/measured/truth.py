@@ -39,7 +39,7 @@ class Truth:
     boundary: tuple[np.ndarray, np.ndarray]
 
     def deviation(self, model: str) -> np.ndarray:
-        """Return |A of the model - A|/A; nan if nothing moves or the model has no answer."""
+        """Return |A of the model - A|/A, or nan if nothing moves or the model has no answer."""
         with np.errstate(divide="ignore", invalid="ignore"):
             value = np.abs(self.models[model] - self.amplitude) / self.amplitude
         return np.asarray(np.where(self.amplitude > 0.0, value, np.nan))
