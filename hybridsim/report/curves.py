@@ -73,7 +73,7 @@ def curves_of(solution: Solution, size: int) -> dict[str, Any]:
 
 
 def ranges_in(sampler: Sampler, bins: int) -> tuple[Array, Array]:
-    """Return the least and the largest value (n, bins) of each quantity in equal bins of time, ends included."""
+    """Return the least and the largest value (n, bins) of each quantity in equal bins of time, including both ends."""
     edges = np.linspace(sampler.steps[0], sampler.steps[-1], bins + 1)
     knots = np.union1d(sampler.steps, edges)
     low = np.full((len(sampler.names), bins), np.nan)

@@ -168,7 +168,7 @@ def _follow(
     go: Callable[[Task], Trajectory],
     commit: Callable[[Position], None],
 ) -> None:
-    """Carry out a task, and pass the position at its end, or after an error at the last event, to `commit`."""
+    """Carry out a task, and pass `commit` the position at its end, or at the last event before an error."""
     record = task.record
     try:
         record = go(task)

@@ -1,4 +1,4 @@
-"""This module converts the segments of a run to plain arrays for a file, and back."""
+"""This module converts the segments of a run to plain arrays for a file, and restores segments from arrays."""
 
 from __future__ import annotations
 

@@ -152,7 +152,7 @@ class Energies(EventsAndModes):
         return float(found[0]) if np.ndim(requested) == 0 else found
 
     def _integrated(self, integrand: Any, first: float, last: float, width: int) -> np.ndarray:
-        """Return integrals (width,) over a part of the run, with the events and steps in it as edges."""
+        """Return integrals (width,) over a part of the run, with the events and steps of this part as edges."""
         self._within(np.array([first, last]), "+")
         (low, high), times = sorted((first, last)), self._trajectory.own_times
         edges = np.unique(np.concatenate([[low, high], times[(times > low) & (times < high)]]))

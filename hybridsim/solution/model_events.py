@@ -32,7 +32,7 @@ class ModelEvents:
 
     @cached_property
     def occurrences(self) -> tuple[Occurrence, ...]:
-        """Return the records of all events, changes of side at corners included."""
+        """Return the records of all events, including changes of side at corners."""
         return tuple(self.record.occurrences)
 
     @cached_property
@@ -52,7 +52,7 @@ class ModelEvents:
 
     @cached_property
     def instants(self) -> np.ndarray:
-        """Return the different times of all events, corners included, and of both ends of the run."""
+        """Return the different times of all events, including corners, and of both ends of the run."""
         times = [block.times for block in self.record.occurrences.blocks]
         return np.unique(np.concatenate([[self.t_start, self.t_end], *times]))
 

@@ -100,7 +100,7 @@ class Advice(Readable):
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """Further findings, one sentence each."""
+        """Further findings, with one sentence per finding."""
         return tuple(_remarks(self))
 
     def __repr__(self) -> str:

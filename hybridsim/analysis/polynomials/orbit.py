@@ -169,7 +169,7 @@ def _zeros(
 
 
 class Turns(NamedTuple):
-    """Local extrema inside the pieces of an orbit, with the time and value of each."""
+    """Local extrema inside the pieces of an orbit, with the time and value of each extremum."""
 
     quantity: np.ndarray
     piece: np.ndarray

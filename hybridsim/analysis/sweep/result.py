@@ -232,7 +232,7 @@ def heading(sweep: Sweep) -> str:
 
 
 def statuses(sweep: Sweep) -> list[str]:
-    """Return the number of points per status, one line each."""
+    """Return the number of points per status, with one line per status."""
     counted = Counter(sweep.status.ravel().tolist()).most_common()
     lines = [f"  {count} of {sweep.status.size} points: {text}" for text, count in counted[:_SHOWN]]
     return lines + ([f"  ... and {len(counted) - _SHOWN} other statuses"] if len(counted) > _SHOWN else [])

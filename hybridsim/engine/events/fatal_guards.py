@@ -23,7 +23,7 @@ def message_of_leaving(
 
 
 def is_only_fatal(system: System, outcome: Outcome) -> bool:
-    """Return whether the only reason why an event could not be resolved is a fatal guard."""
+    """Return whether a fatal guard is the only reason why an event could not be resolved."""
     messages = (message for a in system.automata for row in a.fatal for message in row)
     return bool(outcome.status) and any(message and message == outcome.message for message in messages)
 

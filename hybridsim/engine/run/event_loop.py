@@ -81,7 +81,7 @@ class LoopCall(NamedTuple):
 
 
 class LoopRecord(NamedTuple):
-    """The stored segments of a run, one row each."""
+    """The stored segments of a run, with one row per segment."""
 
     clocks: np.ndarray  # (., 2) time origin
     modes: np.ndarray  # (., C) modes

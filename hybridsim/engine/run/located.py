@@ -242,7 +242,7 @@ def _before_instant(series: Any, arrival: Arrival, segment: SegmentRun) -> np.nd
 
 
 def located_backward(system: System, origin: Instant, arrival: Arrival, segment: SegmentRun) -> Located:
-    """Return the state and the guards and monitors that are zero, for a run backward in time."""
+    """Return the state, with the guards and monitors at zero, for a run backward in time."""
     at = situation(system, arrival, segment)
     fired = coincident(system, origin, at, arrival.fired) if arrival.fired else {}
     sides = segment.locator.monitor_sides

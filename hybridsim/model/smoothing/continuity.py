@@ -100,6 +100,6 @@ def has_root_beside_sign(meanings: Meanings, node: ast.expr) -> bool:
 
 
 def _depends(p: Polynomial, name: str) -> bool:
-    """Return whether a polynomial depends on a name, also inside factors that are not names."""
+    """Return whether a polynomial depends on a name, directly or inside a factor that is not a name."""
     factors = {factor for monomial in p for factor, _ in monomial}
     return any(name == factor or (not is_name(factor) and name in factor) for factor in factors)

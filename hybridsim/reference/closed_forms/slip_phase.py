@@ -1,4 +1,4 @@
-"""This module gives one slip phase of a forced linear oscillator in closed form, and its end.
+"""This module gives one slip phase of a forced linear oscillator, including its end, in closed form.
 
 x'' + c x' + k (x - centre) = F sin(angle + w s),      s is the time since the start of the phase
 x(s) = centre + Re(own exp(rate s)) + Im(response exp(i (angle + w s)))

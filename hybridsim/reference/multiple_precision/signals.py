@@ -100,7 +100,7 @@ class Signal:
 
 
 def _cubics(declared: Input, times: Sequence[Number], number: Any) -> list[tuple[Number, ...]]:
-    """Return the cubic polynomials before the first knot, between knots, and after the last."""
+    """Return the cubic polynomials before the first knot, between knots, and after the last knot."""
     values, zero = [number(v) for v in declared.values], number(0)
     bends = _natural_bends(times, values, zero) if declared.interpolation == "cubic" else [zero] * len(times)
     rows = []

@@ -1,4 +1,4 @@
-"""This module applies declared transitions: choices of guards and resets, applied together."""
+"""This module applies declared transitions, with choices of guards, and with all resets together."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ MOST_POINTS = 1 << 27  # rows per column: one gigabyte
 
 
 def equal_steps(t0: float, t1: float, points: int) -> np.ndarray:
-    """Return equally spaced times (points,), both ends included."""
+    """Return equally spaced times (points,), including both ends."""
     return np.linspace(t0, t1, whole_number(points, "points", 2, MOST_POINTS))
 
 
