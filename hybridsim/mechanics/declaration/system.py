@@ -285,8 +285,7 @@ class MechanicalSystem:
             for i, _ in contact.direction:
                 if not 0 <= i < self.n:
                     raise UsageError(
-                        f"{what} {contact.name}: its direction has the coordinate {i}, but there "
-                        f"are {self.n} coordinates",
+                        f"{what} {contact.name}: its direction has the coordinate {i}, but there are {self.n}",
                         remedy="number the coordinates from 0",
                     )
 
