@@ -188,8 +188,8 @@ count as a pair.
 | --- | --- | --- | --- | --- | --- | --- |
 """
 PAIRS = """
-A zero of a pair is *late* if its error exceeds {late:.0e} of the span. The error must also be larger than the error
-of the guard can cause. The error of the guard is 1e-13 of its size for `exact`, and a tenth of rtol for `taylor`. A
+A zero of a pair is *late* if its error exceeds {late:.0e} of the span. It must also be larger than the effect of the
+error of the guard. The error of the guard is 1e-13 of its size for `exact`, and a tenth of rtol for `taylor`. A
 single zero is *late* if its error exceeds 1e-10 of the span and 1e-10 of the size divided by the slope. If the error
 is more than ten times as large, the zero counts as missed, and the event as spurious. *Off by* is the error in time
 of single zeros, multiplied by the slope and divided by the size.
