@@ -76,7 +76,7 @@ def _curve(axes: Axes, contact: Contact, speed: float) -> None:
         force = [sign * slip_force(contact, v, backward=sign < 0) for v in speeds]
         axes.plot(sign * speeds, force, color=colour, linewidth=1.6)
         for table in contact.law.tables if sign > 0 else ():
-            marked = [v for v in table.at if v <= speed]
+            marked = [v for v in table.at if v <= speed and table.over.text == "v"]
             forces = [slip_force(contact, v) for v in marked]
             axes.plot(marked, forces, "o", color=colour, markersize=4, label="points of the table")
     axes.plot([0, 0], limits, color=style.INK, linewidth=3.0, solid_capstyle="butt")
@@ -84,10 +84,16 @@ def _curve(axes: Axes, contact: Contact, speed: float) -> None:
 
 def slip_force(contact: Contact, speed: float, *, backward: bool = False) -> float:
     """Return the magnitude of the slip force of a contact at a given speed."""
-    names = {table.name: table.value(speed) for table in contact.law.tables}
-    slip = (contact.law.slip_backward if backward else None) or contact.law.slip
-    values = {name: evaluate(e, {}) for name, e in contact.values().items() if name not in names}
-    return evaluate(slip, {**values, **names, "v": speed})
+    law = contact.law
+    of_tables = {table.name for table in law.tables}
+    values = {name: evaluate(e, {}) for name, e in contact.values().items() if name not in of_tables}
+    values["v"] = speed
+    arguments = {
+        table.name: [evaluate(e, values) for e in (table.over, table.across) if e is not None]
+        for table in law.tables
+    }
+    values |= {table.name: table.value(*arguments[table.name]) for table in law.tables}
+    return evaluate((law.slip_backward if backward else None) or law.slip, values)
 
 
 def _driven(

@@ -37,7 +37,7 @@ def check_law(scope: Scope, law: FrictionLaw) -> None:
     names = _own_names(scope, law)
     known = names | {SPEED, NORMAL, LOAD_RATE} | ({INDEX} if law.copies else set())
     parameters = frozenset(law.parameters)
-    at_rest = {t.name for t in law.tables if t.over.text == SPEED or SPEED not in t.over.names}
+    at_rest = {t.name for t in law.tables if t.is_at_rest}
     used: set[str] = set()
     for field, expr in law.expressions():
         used |= expr.names

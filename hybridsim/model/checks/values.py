@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator
+from itertools import product
 from typing import Any, NamedTuple
 
 from hybridsim.errors import ModelError
@@ -231,13 +232,24 @@ def _slip_at_points(findings: Findings, contact: Contact, values: dict[str, floa
     """Check that the slip force is not negative at the points of tables, in one direction of slip."""
     if backward and contact.law.slip_backward is None:
         return
-    for speed in _speeds_of_tables(contact):
-        force = contact.slip_force_at(speed, backward)
-        value = _value(findings, force, values) if force.names <= values.keys() else None
+    for speed, (across, rows) in product(_speeds_of_tables(contact), _columns_of_tables(contact)):
+        force, known = contact.slip_force_at(speed, backward), values | rows
+        value = _value(findings, force, known) if force.names <= known.keys() else None
         if value is not None and value < 0:
-            message = f"contact {contact.name}: the slip force at v = {speed:g} cannot be {value:g}"
+            message = f"contact {contact.name}: the slip force at v = {speed:g}{across} cannot be {value:g}"
             findings.fail(contact, message, "a friction force must not be negative")
             return
+
+
+def _columns_of_tables(contact: Contact) -> list[tuple[str, dict[str, float]]]:
+    """Return the row variables at each number of the second argument of a table, with a description of the place."""
+    found: list[tuple[str, dict[str, float]]] = []
+    for table in contact.law.tables:
+        if table.across is not None:
+            names = table.row_names(contact.variable(table.name))
+            for at, column in zip(table.across_at, zip(*table.values, strict=True), strict=True):
+                found.append((f", {table.across.text} = {at:g}", dict(zip(names, column, strict=True))))
+    return found or [("", {})]
 
 
 def _speeds_of_tables(contact: Contact) -> list[float]:

@@ -133,6 +133,8 @@ class FrictionLaw(Declared):
             yield f"definition {name}", value
         for table in self.tables:
             yield f"table {table.name}, over", table.over
+            if table.across is not None:
+                yield f"table {table.name}, across", table.across
         for state in self.states:
             yield f"state {state.name}, start", state.start
             yield f"state {state.name}, der", state.der

@@ -142,9 +142,11 @@ class Contact(Declared):
         if self.opens:
             yield self._lifting(values)
         for table in self.law.tables:
-            argument = substitute(table.over, {**values, SPEED: self._argument_speed()})
+            names = {**values, SPEED: self._argument_speed()}
+            argument = substitute(table.over, names)
+            across = None if table.across is None else substitute(table.across, names)
             from_zero = table.over.text == SPEED and self.law.is_set_valued
-            yield table.component(self.variable(table.name), argument, from_zero)
+            yield from table.components(self.variable(table.name), argument, across, from_zero)
 
     def variable(self, name: str) -> str:
         """Return the name that a state, table or load of the friction law has in the model."""
@@ -153,7 +155,7 @@ class Contact(Declared):
     @property
     def table_speed(self) -> str | None:
         """The name of the variable that is the argument of tables of the speed, or None without tables."""
-        asked = any(SPEED in table.over.names for table in self.law.tables)
+        asked = any(SPEED in names for table in self.law.tables for names in table.arguments())
         return self.variable(SPEED) if asked and self.law.is_set_valued else None
 
     def _argument_speed(self) -> Expression:
@@ -214,7 +216,8 @@ class Contact(Declared):
 
     def slip_force_at(self, speed: float, backward: bool = False) -> Expression:
         """Return the magnitude of the slip force at a numeric speed."""
-        names = {t.name: parse(t.value(speed)) for t in self.law.tables if t.over.text == SPEED}
+        tables = [t for t in self.law.tables if t.over.text == SPEED]
+        names = {t.name: t.expression_at(speed, self.variable(t.name)) for t in tables}
         slip = (self.law.slip_backward if backward else None) or self.law.slip
         assert slip is not None  # always set in a set-valued law
         return substitute(self._form("slip", slip=slip), {SPEED: parse(speed), **self.values(), **names})
@@ -231,7 +234,7 @@ class Contact(Declared):
             names |= self.values()
             for table in self.law.tables:
                 if table.over.text == SPEED:
-                    names[table.name] = parse(table.value(0.0))
+                    names[table.name] = table.expression_at(0.0, self.variable(table.name))
             self._forces[which] = substitute(self._form("force", force=force), names)
         return self._forces[which]
 

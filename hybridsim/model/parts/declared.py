@@ -137,11 +137,18 @@ class Declared(metaclass=_Refusing):
     def _numbers(self, *fields: str) -> None:
         """Convert the fields to tuples of floats."""
         for name in fields:
-            entries = getattr(self, name)
-            try:
-                object.__setattr__(self, name, tuple(_as_double(number) for number in as_tuple(entries)))
-            except (TypeError, ValueError, OverflowError):
-                raise self._fault(f"`{name}` cannot be {entries!r}", "use numbers") from None
+            object.__setattr__(self, name, self._doubles(name, getattr(self, name)))
+
+    def _rows(self, field: str) -> None:
+        """Convert a field to a tuple of rows, each of which is a tuple of floats."""
+        rows = as_tuple(getattr(self, field))
+        object.__setattr__(self, field, tuple(self._doubles(field, row) for row in rows))
+
+    def _doubles(self, field: str, entries: Any) -> tuple[float, ...]:
+        try:
+            return tuple(_as_double(number) for number in as_tuple(entries))
+        except (TypeError, ValueError, OverflowError):
+            raise self._fault(f"`{field}` cannot be {entries!r}", "use numbers") from None
 
     def _has_default(self, field: str) -> bool:
         return self.__dataclass_fields__[field].default is not MISSING

@@ -159,19 +159,34 @@ def _states(law: Table) -> Iterator[State]:
 
 def _tables(law: Table, folder: Path) -> Iterator[LawTable]:
     for name, table in law.entries("tables", f"{law.kind}, table"):
-        table.only(*_POINTS, "over", "interpolation", "file", "columns")
+        table.only(*_POINTS, "over", "interpolation", "across", "across_at", "file", "columns")
+        across = table.expression("across")
         if "file" in table.data:
-            numbers = numbers_from_file(table, folder, _POINTS, "arguments")
+            if across is not None:
+                table.fail(
+                    "'file' and 'across' cannot be combined", "write the points in the model file", "across"
+                )
+                continue
+            numbers: dict[str, Any] = numbers_from_file(table, folder, _POINTS, "arguments")
             if not numbers:
                 continue
         else:
             for key in _POINTS:
                 table.require(key, f"write {key} = [0, ...]")
-            numbers = {key: table.numbers(key) for key in _POINTS}
+            numbers = {"at": table.numbers("at")}
+            numbers["values"] = table.numbers("values") if across is None else table.rows("values")
         over = table.expression("over") or parse(SPEED)
         way = table.text("interpolation", "cubic")
         try:
-            yield LawTable(name, **numbers, over=over, interpolation=way, place=table.place)
+            yield LawTable(
+                name,
+                **numbers,
+                over=over,
+                interpolation=way,
+                across=across,
+                across_at=table.numbers("across_at"),
+                place=table.place,
+            )
         except UsageError as fault:
             table.fail(fault.message.partition(": ")[2], fault.remedy or "")
 

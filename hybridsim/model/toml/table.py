@@ -107,6 +107,17 @@ class Table:
             return ()
         return tuple(_real(value) for value in found)
 
+    def rows(self, key: str) -> tuple[tuple[float, ...], ...]:
+        """Return a list of lists of numbers; a wrong list is reported and returned as empty."""
+        found = self._typed(key, list, "a list of lists of numbers", [])
+        for row in found:
+            if not isinstance(row, list) or any(
+                isinstance(v, bool) or not isinstance(v, (int, float)) for v in row
+            ):
+                self.fail(f"'{key}' contains {_shown(row)}", "use a list of lists of numbers", key)
+                return ()
+        return tuple(tuple(_real(value) for value in row) for row in found)
+
     def expression(self, key: str, remedy: str | None = None) -> Expression | None:
         """Return the expression of a key, or None; a missing key is reported if a remedy is given."""
         if key not in self.data:

@@ -120,7 +120,7 @@ def _law(law: FrictionLaw) -> dict[str, Any]:
 
 def _table(table: LawTable) -> dict[str, Any]:
     way = {} if table.interpolation == "cubic" else _fields(table, "interpolation")
-    return {**_fields(table, "at", "values", "over"), **way}
+    return {**_fields(table, "at", "values", "over", "across", "across_at"), **way}
 
 
 def _contact(contact: Contact, laws: Mapping[str, FrictionLaw]) -> dict[str, Any]:
