@@ -10,13 +10,12 @@ from typing import Any
 
 from hybridsim.errors import Place
 from hybridsim.expr import Expression, parse, substitute
+from hybridsim.model.laws.point_interpolation import CUBIC, LINEAR, texts, texts_of_names, value
 from hybridsim.model.parts.component import Choice, Corner, Guard, Mode
 from hybridsim.model.parts.declared import Declared
 
 _SPEED = parse("v")
-INTERPOLATIONS = ("cubic", "linear")
-Piece = tuple[float, float, float, float, float]
-"""Left end of the piece, and the coefficients of 1, d, d**2, d**3, with d the distance from the left end."""
+INTERPOLATIONS = (CUBIC, LINEAR)
 
 
 @dataclass(frozen=True)
@@ -107,7 +106,7 @@ class LawTable(Declared):
 
     def _grid(self) -> None:
         """Convert the values of a table of two arguments to rows of floats, and check them."""
-        if self.interpolation != "linear":
+        if self.interpolation != LINEAR:
             raise self._fault(
                 "a table of two arguments cannot have cubic interpolation", 'set interpolation="linear"'
             )
@@ -160,15 +159,10 @@ class LawTable(Declared):
 
     def value(self, argument: float, across: float = 0.0) -> float:
         """Return the value of the function at one argument, or at both arguments of a table of two."""
+        values = self.values
         if self.across is not None:
-            return self._with_row(self._row_at(across)).value(argument)
-        if argument <= self.at[0]:
-            return float(self.values[0])
-        if argument >= self.at[-1]:
-            return float(self.values[-1])
-        left, *c = next(p for p in reversed(self.pieces()) if p[0] <= argument)
-        d = argument - left
-        return c[0] + d * (c[1] + d * (c[2] + d * c[3]))
+            values = tuple(value(self.across_at, row, LINEAR, across) for row in self.values)
+        return value(self.at, values, self.interpolation, argument)
 
     def expression_at(self, argument: float, name: str) -> Expression:
         """Return the value at a number of the first argument.
@@ -177,9 +171,11 @@ class LawTable(Declared):
         """
         if self.across is None:
             return parse(self.value(argument))
-        names = self.row_names(name)
-        shares = [self._with_row(unit).value(argument) for unit in _units(len(self.at))]
-        return parse(" + ".join(f"{w!r}*{row}" for w, row in zip(shares, names, strict=True) if w != 0.0))
+        count, terms = len(self.at), []
+        for k, row in enumerate(self.row_names(name)):
+            share = value(self.at, [float(i == k) for i in range(count)], LINEAR, argument)
+            terms += [f"{share!r}*{row}"] * (share != 0.0)
+        return parse(" + ".join(terms))
 
     def arguments(self) -> list[frozenset[str]]:
         """Return the names in each argument."""
@@ -195,52 +191,6 @@ class LawTable(Declared):
         """Return the variables with the values at each number in `at`, for a table of two arguments."""
         return [f"{name}_{k}" for k in range(1, len(self.at) + 1)] if self.across is not None else []
 
-    def _row_at(self, across: float) -> list[float]:
-        """Return the values at each number in `at`, for one number of the second argument."""
-        return [
-            LawTable(self.name, self.across_at, row, interpolation="linear").value(across)
-            for row in self.values
-        ]
-
-    def _with_row(self, values: Sequence[float]) -> LawTable:
-        """Return the table of the first argument alone, with these values."""
-        return LawTable(self.name, self.at, tuple(values), self.over, "linear")
-
-    def pieces(self) -> list[Piece]:
-        """Return the polynomials between the points, from left to right."""
-        if self.interpolation == "linear":
-            points = list(zip(self.at, self.values, strict=True))
-            return [(x, y, (y1 - y) / (x1 - x), 0.0, 0.0) for (x, y), (x1, y1) in pairwise(points)]
-        slopes, found = self._slopes(), []
-        for k, x in enumerate(self.at[:-1]):
-            h, first, last = self.at[k + 1] - x, slopes[k], slopes[k + 1]
-            chord = (self.values[k + 1] - self.values[k]) / h
-            found.append(
-                (
-                    x,
-                    self.values[k],
-                    first,
-                    (3.0 * chord - 2.0 * first - last) / h,
-                    (first + last - 2.0 * chord) / h**2,
-                )
-            )
-        return found
-
-    def _slopes(self) -> list[float]:
-        """Return the slopes at the points: weighted harmonic means of the slopes of adjacent intervals."""
-        h = [b - a for a, b in zip(self.at, self.at[1:], strict=False)]
-        chord = [(b - a) / w for a, b, w in zip(self.values, self.values[1:], h, strict=False)]
-        if len(h) == 1:
-            return [chord[0], chord[0]]
-        inner = []
-        for k in range(1, len(h)):
-            before, after = chord[k - 1], chord[k]
-            w1, w2 = 2.0 * h[k] + h[k - 1], h[k] + 2.0 * h[k - 1]
-            inner.append((w1 + w2) / (w1 / before + w2 / after) if before * after > 0.0 else 0.0)
-        first = _end_slope(h[0], h[1], chord[0], chord[1])
-        last = _end_slope(h[-1], h[-2], chord[-1], chord[-2])
-        return [first, *inner, last]
-
     def components(
         self, name: str, argument: Expression, across: Expression | None, from_zero: bool
     ) -> Iterator[Corner]:
@@ -253,29 +203,21 @@ class LawTable(Declared):
         """
         rows = self.row_names(name)
         if across is not None:
-            tables = [LawTable(self.name, self.across_at, row, interpolation="linear") for row in self.values]
-            texts = dict(zip(rows, (table.texts() for table in tables), strict=True))
-            yield _automaton(f"{name}_across", texts, self.across_at, across, self.place)
-        texts = {name: _between(self.at, rows) if rows else self.texts()}
-        if from_zero and self.at[0] <= 0.0:
-            texts[name] = texts[name][1:]
-        yield _automaton(name, texts, self.at, argument, self.place)
-
-    def texts(self) -> list[str]:
-        """Return the function of the argument `a` below the first point, between the points, and above the last."""
-        found = [repr(self.values[0])]
-        for x, *c in self.pieces():
-            d = f"(a - ({x!r}))"
-            curved = "" if self.interpolation == "linear" else f" + {d}*({c[2]!r} + {d}*({c[3]!r}))"
-            found.append(f"{c[0]!r} + {d}*({c[1]!r}{curved})")
-        return [*found, repr(self.values[-1])]
+            found = {
+                row: texts(self.across_at, values, LINEAR)
+                for row, values in zip(rows, self.values, strict=True)
+            }
+            yield _automaton(f"{name}_across", found, self.across_at, across, self.place)
+        own = texts_of_names(self.at, rows) if rows else texts(self.at, self.values, self.interpolation)
+        skipped = 1 if from_zero and self.at[0] <= 0.0 else 0
+        yield _automaton(name, {name: own[skipped:]}, self.at, argument, self.place)
 
 
 def _automaton(
-    name: str, texts: dict[str, list[str]], at: Sequence[float], argument: Expression, place: Place | None
+    name: str, pieces: dict[str, list[str]], at: Sequence[float], argument: Expression, place: Place | None
 ) -> Corner:
     """Return the automaton that sets some variables to functions of the argument `a`, which change at points."""
-    count = len(next(iter(texts.values())))
+    count = len(next(iter(pieces.values())))
     ends, modes = at[len(at) + 1 - count :], []
     for k in range(count):
         guards = []
@@ -283,32 +225,10 @@ def _automaton(
             guards.append(_guard("left", f"a - ({ends[k - 1]!r})", argument, str(k)))
         if k < len(ends):
             guards.append(_guard("right", f"{ends[k]!r} - a", argument, str(k + 2)))
-        values = {of: substitute(parse(pieces[k]), {"a": argument}) for of, pieces in texts.items()}
+        values = {of: substitute(parse(own[k]), {"a": argument}) for of, own in pieces.items()}
         modes.append(Mode(str(k + 1), tuple(guards), set=values))
     return Corner(name, tuple(modes), initial="1", place=place)
 
 
-def _between(at: Sequence[float], rows: Sequence[str]) -> list[str]:
-    """Return linear functions of the argument `a` between variables, which are the values at points."""
-    found = [rows[0]]
-    for (x, row), (x1, row1) in pairwise(zip(at, rows, strict=True)):
-        found.append(f"{row} + (a - ({x!r}))*(({row1} - {row})/{x1 - x!r})")
-    return [*found, rows[-1]]
-
-
-def _units(count: int) -> list[list[float]]:
-    return [[float(i == k) for i in range(count)] for k in range(count)]
-
-
 def _guard(name: str, text: str, argument: Expression, to: str) -> Guard:
     return Guard(name, substitute(parse(text), {"a": argument}), (Choice(to),))
-
-
-def _end_slope(h: float, other: float, chord: float, next_chord: float) -> float:
-    """Return the three-point slope at an end, limited so that the cubic stays monotone."""
-    slope = ((2.0 * h + other) * chord - h * next_chord) / (h + other)
-    if slope * chord <= 0.0:
-        return 0.0
-    if chord * next_chord <= 0.0 and abs(slope) > 3.0 * abs(chord):
-        return 3.0 * chord
-    return slope
