@@ -71,7 +71,7 @@ class Energies(EventsAndModes):
         return float(self._integrated(product, *self._part(t_span), 1)[0])
 
     def _part(self, t_span: Any) -> tuple[float, float]:
-        """Return the first and last time of a part of the run, which is all of it for None."""
+        """Return the first and last time of a part of the run; None means the whole run."""
         whole = (self.t_start, self.t_end)
         first, last = whole if t_span is None else two_numbers(t_span, "t_span", "use two times, (a, b)")
         low, high = sorted(whole)

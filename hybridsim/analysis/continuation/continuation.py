@@ -118,7 +118,7 @@ def continuation(
         raise UsageError(
             f"`bounds` {bounds!r} do not contain the model's value {parameter} = {value:g}",
             remedy="use bounds that contain the model's value, or change this value with "
-            "params={{parameter!r}: ...}",
+            f"params={{{parameter!r}: ...}}",
         )
     method = {"integrator": integrator, "rtol": rtol, **options}
     start = steady_state(model, x0=x0, **method)

@@ -1,1 +1,1 @@
-"""This package represents a part of a run by polynomials between its events: first the result, then its intervals."""
+"""This package represents a part of a run by polynomials on intervals between its events."""

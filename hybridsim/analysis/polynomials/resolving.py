@@ -139,7 +139,7 @@ class _Finished(NamedTuple):
 
 
 def orbit_of(solution: Solution, chosen: Sequence[str] | None = None) -> Orbit:
-    """Return a forward run, or the saved part of it, as an `Orbit` of some quantities, or of all."""
+    """Return a forward run, or the saved part of it, as an `Orbit` of all or some quantities."""
     sample = Sampler(solution, chosen)
     index, s, _ = solution._segments.knots()
     same = (index[1:] == index[:-1]) & (s[1:] > s[:-1])

@@ -195,7 +195,7 @@ def _free(monodromy: np.ndarray, by: np.ndarray, rates: np.ndarray) -> tuple[np.
 def _relative_periods(
     system: System, slopes: np.ndarray, parameters: Sequence[str], solution: Solution
 ) -> np.ndarray:
-    """Return the derivatives (P,) of the logarithm of the forcing's period; slopes: those of all parameters."""
+    """Return the derivatives (P,) of the logarithm of the forcing's period, from the `slopes` of all parameters."""
     by_name = {p.name: row for p, row in zip(system.model.parameters, slopes, strict=True)}
     rates = VectorSlopes(system, solution._segments[0].origin).rates @ slopes
     found = [-row / rate for row, rate in zip(rates, system.rates.tolist(), strict=True) if rate != 0.0]

@@ -35,7 +35,7 @@ class OneSide:
         return self._carrier.between(self._carried, self._directions, number, stops)
 
     def shift(self, number: int) -> np.ndarray:
-        """Return the derivatives (M,) of the time at which a segment starts; zero behind the last one."""
+        """Return the derivatives (M,) of the time at which a segment starts, or zero after the last segment."""
         return _shift(self._carried, number)
 
     def own_sizes(self) -> np.ndarray:

@@ -66,7 +66,7 @@ class OverTime:
         return Derivatives(tuple(names), found[..., : self._starts], found[..., self._starts :])
 
     def require(self, names: Sequence[str]) -> None:
-        """Raise `UsageError` for a name of no state or quantity."""
+        """Raise `UsageError` for a name that is not a state or quantity."""
         for name in names:
             if name not in self._known:
                 raise UsageError(
@@ -101,7 +101,7 @@ class OverTime:
         return found
 
     def shift(self, number: int) -> np.ndarray:
-        """Return the derivatives (M,) of the time at which a segment starts; zero behind the last one."""
+        """Return the derivatives (M,) of the time at which a segment starts, or zero after the last segment."""
         return self._sides.shift(number)
 
     def own_sizes(self) -> np.ndarray:

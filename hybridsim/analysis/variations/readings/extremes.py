@@ -22,7 +22,7 @@ _BETWEEN = np.linspace(0.0, 1.0, 9)  # points of a piece at which it is compared
 
 
 class Place(NamedTuple):
-    """A point of a run: the number of its segment, the local time, its kind, the value, and its piece."""
+    """A point of a run: segment number, local time, kind, value and number of the piece."""
 
     number: int
     s: float
@@ -65,7 +65,7 @@ class Extremes:
         self._tie = max(_TIE, solution._run.task.tolerances.rtol) * self.size
 
     def attained(self, sign: int) -> list[Place]:
-        """Return the points of the greatest value (sign 1) or the least (sign -1), the best one first.
+        """Return the points of the greatest value (sign 1) or the least value (sign -1), with the best point first.
 
         Values that differ by less than the accuracy of the run are equal. Of points that are not separated by other
         values, one is returned.
@@ -83,7 +83,7 @@ class Extremes:
         return sorted(chosen, key=lambda place: -sign * place.value)
 
     def _groups(self, points: list[Place], sign: int) -> list[list[Place]]:
-        """Group points between which all values are equal to theirs."""
+        """Group points if all values between the points are equal to the values at the points."""
         least = min(sign * place.value for place in points) - self._tie
         ordered = sorted(points, key=lambda place: (place.number, place.s))
         groups = [ordered[:1]]
@@ -98,13 +98,13 @@ class Extremes:
         return groups
 
     def _least_between(self, k: int, one: Place, other: Place, sign: int) -> float:
-        """Return the least value (sign 1) of piece k between two points, or minus the greatest one."""
+        """Return the least value (sign 1) of piece k between two points, or minus the greatest value."""
         low = self._local(k, one.s) if k == one.piece else -1.0
         high = self._local(k, other.s) if k == other.piece else 1.0
         return float((sign * legendre.legval(low + (high - low) * _BETWEEN, self._series[k])).min())
 
     def _representative(self, group: list[Place], sign: int) -> Place:
-        """Return the best place of a group; the time of a constant part or an end is exact, that of a turn is not."""
+        """Return the best place of a group. The time of a constant part or an end is exact, unlike the time of a turn."""
         best = max(sign * place.value for place in group)
         near = [place for place in group if sign * place.value >= best - _SAME * self.size]
         return max(near, key=lambda place: (place.where == HELD, place.where != INSIDE, sign * place.value))
@@ -130,7 +130,7 @@ class Extremes:
         return self._first < (number, s) < self._last
 
     def _turns(self, sign: int) -> list[Place]:
-        """Return the extrema inside pieces, and those at the common end of two pieces of a segment."""
+        """Return the extrema inside pieces, and the extrema at the common end of two pieces of a segment."""
         turns, orbit, found = self._orbit.turns, self._orbit, []
         for k, t, value, is_minimum in zip(
             turns.piece.tolist(), turns.t.tolist(), turns.value.tolist(), turns.is_minimum, strict=True

@@ -146,7 +146,7 @@ class Readings:
         return float(self._solution._segments[place.number].origin.plus(place.s))
 
     def at_end(self, names: Sequence[str]) -> float:
-        """Return the value of a product at the end of the run, just before any event there."""
+        """Return the value of a product at the end of the run, just before any event at this end."""
         lengths = np.diff(self._solution._segments.spans(), axis=1)
         return self._product(names, int(np.flatnonzero(lengths > 0.0)[-1]), -1)
 
