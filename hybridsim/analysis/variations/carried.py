@@ -45,6 +45,7 @@ from hybridsim.analysis.variations.segment_events import (
     time_rounding,
 )
 from hybridsim.analysis.variations.sizes import sizes
+from hybridsim.analysis.variations.values.table_slopes import TableValue
 from hybridsim.analysis.variations.values.vector_slopes import VectorSlopes
 from hybridsim.engine.record.segments import Segment
 from hybridsim.engine.system.system import System
@@ -58,7 +59,7 @@ _SAME = 1e-9  # of its size: a state that changes by less at an event does not j
 class Carrier:
     """Computes derivatives along one run."""
 
-    def __init__(self, solution: Solution) -> None:
+    def __init__(self, solution: Solution, tables: Sequence[TableValue] = ()) -> None:
         self.solution = solution
         self.system: System = solution._system
         if not self.system.has_tape:
@@ -68,7 +69,7 @@ class Carrier:
             )
         largest = sizes(solution)
         self._scale = np.where(largest > 0.0, largest, 1.0)
-        self._vector = VectorSlopes(self.system, solution._segments[0].origin)
+        self._vector = VectorSlopes(self.system, solution._segments[0].origin, tables)
         self._flow = FlowDerivatives(solution, self._scale, self._vector)
         self._end = solution._segments[-1].end
         self._rounding = time_rounding(solution)
@@ -171,7 +172,7 @@ class Carrier:
     def own_sizes(self, directions: Directions) -> np.ndarray:
         """Return the length (M,) along each direction at which some quantity has changed by its own size."""
         system = self.system
-        constants = np.abs(np.concatenate([system.discrete_start, list(system.values.values())]))
+        constants = np.abs(np.concatenate([system.discrete_start, self._vector.constants()]))
         scale = np.concatenate([self._scale, np.where(constants > 0.0, constants, 1.0)])
         changes = np.concatenate([directions.x, directions.discrete, directions.parameters])
         relative = (np.abs(changes) / scale[:, None]).max(axis=0)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hybridsim.analysis.variations.tapes import tangent_tape
-from hybridsim.analysis.variations.values.no_derivative import argument_names, no_derivative
+from hybridsim.analysis.variations.values.no_derivative import no_derivative
 from hybridsim.analysis.variations.values.vector_slopes import VectorSlopes
 from hybridsim.engine.system.system import System
 
@@ -106,7 +106,7 @@ class Changes:
         others = np.concatenate([at.Yd, self.G])
         by = by_states @ at.Y + by_others @ others + np.outer(by_time, at.shift)
         states, times, constants = np.abs(by_states), np.abs(by_time), np.abs(by_others)
-        fixed = constants @ np.abs(np.concatenate([system.discrete(at.p), at.p[: len(self.G)]]))
+        fixed = constants @ np.abs(np.concatenate([system.discrete(at.p), self.vector.constants()]))
         size = states @ self._scale
         sizes = states @ np.maximum(np.abs(at.Y), at.large) + constants @ np.abs(others)
         sizes += np.outer(times, np.abs(at.shift)) + _ROUNDING / _ALIKE * np.outer(
@@ -130,5 +130,5 @@ class Changes:
             title = "the function of a monitor or surface"
             if k < len(guards):
                 title = self.system.guard_title(guards[k], at.z)
-            by = [name for name, is_bad in zip(argument_names(self.system), bad[k], strict=True) if is_bad]
+            by = [name for name, is_bad in zip(self.vector.arguments, bad[k], strict=True) if is_bad]
             raise no_derivative(self.system, title, by, at.origin + at.s, at.x, ())

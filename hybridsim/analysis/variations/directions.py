@@ -7,23 +7,27 @@ from dataclasses import dataclass
 import numpy as np
 
 from hybridsim.analysis.variations.off_zero import OffZero
+from hybridsim.analysis.variations.values.table_slopes import TableValue
 
 
 @dataclass(frozen=True)
 class Directions:
     """M directions of change in the states, the discrete states and the parameters.
 
-    x (n, M), discrete (d, M), parameters (P, M): the derivatives at the start of the run.
+    x (n, M), discrete (d, M): the derivatives at the start of the run.
+    parameters (P + V, M): those of the parameters, and of V values of tables.
     """
 
     x: np.ndarray
     discrete: np.ndarray
     parameters: np.ndarray
+    tables: tuple[TableValue, ...] = ()
 
     def both_ways(self, chosen: np.ndarray) -> Directions:
         """Return some of the directions, followed by the opposite directions."""
         rows = self.x[:, chosen], self.discrete[:, chosen], self.parameters[:, chosen]
-        return Directions(*(np.concatenate([row, -row], axis=1) for row in rows))
+        x, discrete, parameters = (np.concatenate([row, -row], axis=1) for row in rows)
+        return Directions(x, discrete, parameters, self.tables)
 
 
 @dataclass(frozen=True)

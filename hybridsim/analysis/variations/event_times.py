@@ -31,7 +31,7 @@ class EventTimes:
     def __init__(self, changes: Changes) -> None:
         self.system, self._changes = changes.system, changes
         parameters = self.system.model.parameters
-        self._slopes = {p.name: row for p, row in zip(parameters, changes.G, strict=True)}
+        self._slopes = {p.name: row for p, row in zip(parameters, changes.G, strict=False)}
 
     def of(
         self,

@@ -16,7 +16,7 @@ from hybridsim.analysis.variations.smooth import (
     transitions,
 )
 from hybridsim.analysis.variations.tapes import tangent_tape
-from hybridsim.analysis.variations.values.no_derivative import argument_names, no_derivative
+from hybridsim.analysis.variations.values.no_derivative import no_derivative
 from hybridsim.analysis.variations.values.vector_slopes import VectorSlopes
 from hybridsim.engine.record.segments import Segment
 from hybridsim.engine.series.dual_numbers import differentiated, values_and_slopes, with_slopes
@@ -56,9 +56,7 @@ class FlowDerivatives:
         if not n or (self._intervals is not None and moving == self._moving):
             return
         self._moving = moving
-        values = np.abs(np.concatenate([self.system.discrete_start, list(self.system.values.values())]))[
-            moving
-        ]
+        values = np.abs(np.concatenate([self.system.discrete_start, self._vector.constants()]))[moving]
         self._constants = np.where(values > 0.0, values, 1.0)
         chosen = [*range(n), *(n + 1 + k for k in moving)]
         self._seeds = [np.ascontiguousarray(self._vector.seeds(one.p)[:, chosen]) for one in self._segments]
@@ -97,7 +95,7 @@ class FlowDerivatives:
             return found
         names = [self.system.names[i] for i in np.flatnonzero(bad.any(axis=1))]
         chosen = [*range(self.system.n), *(self.system.n + 1 + k for k in self._moving)]
-        by = [argument_names(self.system)[chosen[i]] for i in np.flatnonzero(bad.any(axis=0))]
+        by = [self._vector.arguments[chosen[i]] for i in np.flatnonzero(bad.any(axis=0))]
         t, x = float(segment.origin.plus(s)), segment.dense(np.array([s]))[0]
         raise no_derivative(self.system, f"the rate of {' and '.join(names)}", by, t, x, names)
 

@@ -47,7 +47,7 @@ class OverTime:
 
     def __init__(self, solution: Solution, directions: Directions, sides: type[OneSide]) -> None:
         self._made_of = solution, directions, sides
-        self.solution, self._sides = solution, sides(Carrier(solution), directions)
+        self.solution, self._sides = solution, sides(Carrier(solution, directions.tables), directions)
         self._quantities = QuantityDerivatives(solution, directions)
         self._known = (*solution.names, *solution.quantities)
         self._starts = len(directions.x) + len(directions.discrete)

@@ -26,7 +26,7 @@ class QuantityDerivatives:
     def __init__(self, solution: Solution, directions: Directions) -> None:
         self.system: System = solution._system
         self._trajectory, self._G = solution._of_model, directions.parameters
-        self._vector = VectorSlopes(self.system, solution._segments[0].origin)
+        self._vector = VectorSlopes(self.system, solution._segments[0].origin, directions.tables)
         self._velocities = list(self._trajectory._velocities)
 
     def of(

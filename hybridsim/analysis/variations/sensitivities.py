@@ -16,6 +16,7 @@ from hybridsim.analysis.variations.over_time import Derivatives, OverTime
 from hybridsim.analysis.variations.readings.of_run import ReadingDerivatives, Readings, quantities_of
 from hybridsim.analysis.variations.refused import refuse
 from hybridsim.analysis.variations.values.parameters import start_slopes, value_slopes
+from hybridsim.analysis.variations.values.table_slopes import table_value
 from hybridsim.arguments import cannot_be, flag
 from hybridsim.calls import refusing
 from hybridsim.errors import UsageError
@@ -194,7 +195,8 @@ def sensitivities(
     solution : Solution
         A run of `simulate`, forward in time, with keep="all". The derivatives are as accurate as this run.
     parameters : sequence of str, optional
-        Names of the parameters; by default all.
+        Names of the parameters; by default all. "u[2]" is value 2 of the table u, an input, counted from 0. A table
+        with the interpolation "previous" stores each value twice, at the start and at the end of its interval.
     starts_follow : bool, optional
         Whether starts that are declared as expressions of parameters change with them, unless the run set others.
 
@@ -239,7 +241,7 @@ def _found(
     starts_follow = flag(starts_follow, "starts_follow")
     chosen = tuple(names) if parameters is None else checked_names(parameters, "parameters")
     for name in chosen:
-        if name not in names:
+        if name not in names and table_value(model, name) is None:
             raise UsageError(
                 f"model {model.name} has no parameter {name!r}",
                 remedy=remedy_for_parameter(model, name),
@@ -279,8 +281,14 @@ def directions_by(
 
     fixed : states and discrete states whose starts do not follow parameters.
     """
-    model = solution.model
-    by_parameter = value_slopes(model, parameters)
+    model, P = solution.model, len(solution.model.parameters)
+    tables = {name: one for name in parameters if (one := table_value(model, name)) is not None}
+    plain = [name for name in dict.fromkeys(parameters) if name not in tables]
+    by_each = np.zeros((P + len(tables), len(plain) + len(tables)))
+    by_each[:P, : len(plain)] = value_slopes(model, plain)
+    by_each[P:, len(plain) :] = np.eye(len(tables))
+    by_all = by_each[:, [[*plain, *tables].index(name) for name in parameters]]
+    by_parameter = by_all[:P]
     parts = []
     for states in (model.states, model.discrete):
         names = [state.name for state in states]
@@ -288,5 +296,5 @@ def directions_by(
         slopes[[name in fixed for name in names]] = 0.0
         chosen = np.array([[float(name == start) for start in starts] for name in names])
         parts.append(np.concatenate([chosen.reshape(len(names), len(starts)), slopes], axis=1))
-    unmoved = np.zeros((len(by_parameter), len(starts)))
-    return Directions(parts[0], parts[1], np.concatenate([unmoved, by_parameter], axis=1))
+    changes = np.concatenate([np.zeros((len(by_all), len(starts))), by_all], axis=1)
+    return Directions(parts[0], parts[1], changes, tuple(tables.values()))

@@ -17,11 +17,6 @@ _EDGES = {"sqrt": 0.0, "abs": 0.0, "sign": 0.0, "log": 0.0, "asin": 1.0, "acos":
 _REMEDY = "move the run off this point, or write a smooth function, such as sqrt(x**2 + b**2) with a small b"
 
 
-def argument_names(system: System) -> list[str]:
-    """Return the names of the columns of `seeds`: states, time, discrete states and parameters."""
-    return [*system.names, "t", *(q.name for q in system.model.discrete), *system.values]
-
-
 def no_derivative(
     system: System, title: str, by: Sequence[str], t: float, x: np.ndarray, states: Sequence[str]
 ) -> UsageError:

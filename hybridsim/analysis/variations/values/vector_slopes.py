@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from hybridsim.analysis.variations.values.parameters import start_slopes
 from hybridsim.analysis.variations.values.signal_slopes import SignalSlopes
+from hybridsim.analysis.variations.values.table_slopes import TableSlopes, TableValue
 from hybridsim.engine.series.dual_numbers import differentiated, values_and_slopes, with_slopes
 from hybridsim.engine.series.layout import SIGNAL_SLOTS
 from hybridsim.engine.system.instant import Instant
@@ -17,9 +19,15 @@ from hybridsim.model.smoothing.steps_in_time import constant_inputs
 
 
 class VectorSlopes:
-    """Derivatives of the run-time vector by the d discrete states and the P parameters."""
+    """Derivatives of the run-time vector by the d discrete states, the P parameters and V values of tables.
 
-    def __init__(self, system: System, at: Instant) -> None:
+    Parameters
+    ----------
+    at : the start of the run.
+    tables : the values of tables.
+    """
+
+    def __init__(self, system: System, at: Instant, tables: Sequence[TableValue] = ()) -> None:
         self.system = system
         layout, module = system.layout, system.code.module
         P = layout.parameters
@@ -29,13 +37,17 @@ class VectorSlopes:
         differentiated(module.rates)(0.0, [], p, [], out)
         self.rates = values_and_slopes(out, P)[1]  # of the forcing's angular rates
         self._signals = self._of_signals()
+        inputs = system.model.inputs
+        self._tables = [(one.number, TableSlopes(inputs[one.number], one.value)) for one in tables]
         n, d = system.n, layout.discrete
         self._fixed = np.zeros(
-            (n + 1 + layout.size, n + 1 + d + P)
+            (n + 1 + layout.size, n + 1 + d + P + len(tables))
         )  # the part that does not depend on the instant
         self._fixed[: n + 1, : n + 1] = np.eye(n + 1)
         self._fixed[n + 1 :][layout.discrete_slice, n + 1 : n + 1 + d] = np.eye(d)
-        self._fixed[n + 1 : n + 1 + P, n + 1 + d :] = np.eye(P)
+        self._fixed[n + 1 : n + 1 + P, n + 1 + d : n + 1 + d + P] = np.eye(P)
+        self.arguments = [*system.names, "t", *(q.name for q in system.model.discrete), *system.values]
+        self.arguments += [f"{inputs[one.number].name}[{one.value}]" for one in tables]
 
     def _of_signals(self) -> list[SignalSlopes]:
         model, width = self.system.model, self.system.layout.parameters
@@ -53,27 +65,35 @@ class VectorSlopes:
         ]
 
     def of(self, p: np.ndarray) -> np.ndarray:
-        """Return the derivatives (size of p, d + P) of a run-time vector."""
+        """Return the derivatives (size of p, d + P + V) of a run-time vector."""
         n = self.system.n
         return self.seeds(p)[n + 1 :, n + 1 :]
 
     def seeds(self, p: np.ndarray) -> np.ndarray:
-        """Return derivatives of the formulas' arguments by states, local time, discrete states and parameters."""
+        """Return derivatives of the formulas' arguments by states, local time and all constants."""
         layout, found = self.system.layout, self._fixed.copy()
         below = found[self.system.n + 1 :, self.system.n + 1 + layout.discrete :]
+        P = layout.parameters
         origin = float(p[layout.origin_at])
         if layout.phases:
-            below[layout.phases_at : layout.signals_at] = origin * self.rates
+            below[layout.phases_at : layout.signals_at, :P] = origin * self.rates
         for k, signal in enumerate(self._signals):
             if not signal.is_fixed:
                 at = layout.signals_at + SIGNAL_SLOTS * k
-                below[at : at + SIGNAL_SLOTS] = signal.coefficients(origin, p[at : at + SIGNAL_SLOTS])
+                below[at : at + SIGNAL_SLOTS, :P] = signal.coefficients(origin, p[at : at + SIGNAL_SLOTS])
+        for v, (number, table) in enumerate(self._tables):
+            at = layout.signals_at + SIGNAL_SLOTS * number
+            below[at : at + SIGNAL_SLOTS, P + v] = table.coefficients(origin)
         return found
+
+    def constants(self) -> np.ndarray:
+        """Return the values (P + V,) of the parameters and of the values of tables."""
+        return np.array([*self.system.values.values(), *(table.value for _, table in self._tables)])
 
     def lifted(self, p: np.ndarray, d: np.ndarray, Yd: np.ndarray, G: np.ndarray) -> list[Any]:
         """Return the run-time vector as dual numbers in M directions.
 
-        d, Yd : values (d,) and derivatives (d, M) of the discrete states. G : derivatives (P, M) of the parameters.
+        d, Yd : values (d,) and derivatives (d, M) of the discrete states. G (P + V, M) : of the others.
         """
         layout = self.system.layout
         values, slopes = p.copy(), self.of(p) @ np.concatenate([Yd, G])
@@ -84,11 +104,11 @@ class VectorSlopes:
         return found
 
     def knots(self, t: Instant) -> list[tuple[str, np.ndarray]]:
-        """Return the inputs with a knot at an instant, within rounding, and the derivatives (P,) of the knot's time."""
+        """Return the inputs with a knot at an instant, within rounding, and the derivatives (P + V,) of its time."""
         slack = 4.0 * math.ulp(float(t))
         found = []
         for one in self._signals:
             knot = one.signal.next_knot(t.plus(-slack), True)
             if knot is not None and abs(knot.minus(t)) <= slack:
-                found.append((one.declared.subject, one.knot(knot)))
+                found.append((one.declared.subject, np.append(one.knot(knot), np.zeros(len(self._tables)))))
         return found
