@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterable, Mapping
+from functools import cache
 from typing import Any
 
 from hybridsim.arguments import integrator_name
@@ -23,7 +24,7 @@ def refuse_unknown(calls: Iterable[Callable[..., Any]], options: Mapping[str, An
     UsageError
         For a name that no function and no integrator accepts, or an unknown integrator.
     """
-    own = {name for call in calls for name in _names(call)}
+    own = {name for call in calls for name in _names_of_ours(call)}
     if "keep" in own:
         own.add("save")  # the deprecated name of an argument of simulate
         if "keep" in options and "save" in options:
@@ -52,6 +53,11 @@ def refuse_what_it_does_not_take(function: Callable[..., Any], options: Mapping[
 def _names(call: Callable[..., Any]) -> list[str]:
     kinds = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
     return [name for name, p in inspect.signature(call).parameters.items() if p.kind in kinds]
+
+
+_names_of_ours = cache(
+    _names
+)  # a signature takes longer to read than a short run; users' functions are not kept
 
 
 def _refuse(options: Mapping[str, Any], known: set[str], whose: str) -> None:

@@ -15,14 +15,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybridsim.engine.events.compiled.scratch import MAX_JOINT_COMPONENTS
-from hybridsim.engine.events.compiled.start import surfaces_of
 from hybridsim.engine.linear.modes import holds_constants, is_always_linear
 from hybridsim.engine.native.kernels import ENABLED, Precompiled
-from hybridsim.engine.native.struct_pack import replaced
 from hybridsim.engine.system.per_structure import spare_scratch
 from hybridsim.engine.system.period import common_multiple
 from hybridsim.engine.system.programs.mode_tables import automata_of, tape_cache_of
 from hybridsim.engine.system.system import System
+from hybridsim.ensemble.points import PeriodSummary, Points, summaries_of
 from hybridsim.ensemble.scratch import GroupScratch
 from hybridsim.ensemble.start import opposing
 from hybridsim.ensemble.tables import EnsembleTables, ensemble_tables
@@ -37,12 +36,8 @@ class Group(NamedTuple):
     """The m points of a group, with the data for their runs."""
 
     numbers: np.ndarray  # numbers (m,) of the points
-    tables: EnsembleTables
-    vectors: np.ndarray  # run-time vectors (m, P)
-    rates: np.ndarray  # rates (m, R) of angles
-    starts: np.ndarray  # initial states (m, n)
-    periods: np.ndarray  # forcing periods (m,)
-    longest: np.ndarray  # longest segments (m,)
+    tables: EnsembleTables  # kept alive for the kernels
+    points: Points
 
 
 def can_run_together(system: System) -> bool:
@@ -75,14 +70,10 @@ class Ensemble:
 
     def __init__(self, system: System, may_continue: Callable[[], bool]) -> None:
         self.system, self.automata, self.may_continue = system, automata_of(system), may_continue
-        self.inputs = system.registers.inputs
         self._first = np.zeros(len(system.automata), dtype=np.int64)
         tape_cache = tape_cache_of(system)
         tape_cache.surround(self._first)
         self.tapes = tape_cache.tapes
-        layout, self.surfaces = system.layout, surfaces_of(system)
-        self.vector_positions = layout.origin_at, layout.phases_at, layout.pin_at
-        self.hold = np.array([a.hold for a in system.automata], dtype=np.int64)
 
     def groups(self, parameters: np.ndarray, starts: np.ndarray, size: int, periods: int) -> Iterator[Group]:
         """Yield the supported points in groups, until `may_continue` returns False.
@@ -103,8 +94,11 @@ class Ensemble:
         vectors[:, : layout.parameters] = parameters
         vectors[:, layout.pin_at] = 1.0
         rates = np.array([system.rates_at(p) for p in vectors]).reshape(len(vectors), -1)
-        known, which = np.unique(rates, axis=0, return_inverse=True)
-        times = np.array([_period(row) for row in known])[which.reshape(-1)]
+        known: dict[bytes, float] = {}
+        for row in rates:
+            if (key := row.tobytes()) not in known:
+                known[key] = _period(row)
+        times = np.array([known[row.tobytes()] for row in rates])
         fastest = np.abs(rates).max(axis=1, initial=0.0)
         with np.errstate(divide="ignore", invalid="ignore"):
             longest = _RENEWAL_TURNS * _FULL_TURN / fastest
@@ -115,25 +109,23 @@ class Ensemble:
         )
         for tables in groups:
             numbers = fit[tables.numbers]
-            yield Group(
-                numbers,
-                tables,
-                vectors[numbers],
-                rates[numbers],
-                np.ascontiguousarray(starts[numbers]),
-                times[numbers],
-                longest[numbers],
-            )
+            of_points = (part[numbers] for part in (vectors, rates, starts, times, longest))
+            yield Group(numbers, tables, Points(tables.addresses, *map(np.ascontiguousarray, of_points)))
+
+    def summaries(self, group: Group) -> PeriodSummary:
+        """Return uninitialised measures of the points of a group."""
+        modes = max((len(automaton.modes) for automaton in self.system.automata), default=0)
+        return summaries_of(len(group.numbers), self.system.n, len(self.system.automata), modes)
 
     @contextmanager
     def scratch(self, group: Group) -> Iterator[GroupScratch]:
-        """Yield scratch arrays for a group, including the group's tables."""
+        """Yield scratch arrays for a group; its kernels enter the tables of each point in the model."""
         spare: deque[Any] = spare_scratch(self.system, "ensemble", group.tables.form)
         try:
             scratch = spare.pop()
         except IndexError:
-            scratch = GroupScratch(self.system, self.tapes, group.tables.first, group.vectors[0])
-        replaced(scratch.model, lin=group.tables.first)
+            points, found = group.points, self.summaries(group)
+            scratch = GroupScratch(self.system, self.tapes, group.tables.first(), points, found)
         yield scratch
         spare.append(scratch)
 

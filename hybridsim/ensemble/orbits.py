@@ -7,25 +7,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hybridsim.engine.linear.motion_summary import NODES, WEIGHTS, MotionSummary
 from hybridsim.engine.native.kernels import Precompiled
 from hybridsim.engine.native.struct_pack import packed
 from hybridsim.engine.run.method_kernels import NOT_LINEAR
 from hybridsim.ensemble.group import Ensemble, Group
+from hybridsim.ensemble.newton import FOLLOWED, MULTIPLE, NEWTON_STEPS, NEXT, OUTCOME
+from hybridsim.ensemble.points import RESTS, UNDECIDED, PeriodSummary
 from hybridsim.ensemble.returns import LONGEST_WORD
-from hybridsim.ensemble.search import (
-    FOLLOWED,
-    MAX_PERIODS,
-    MOST_FOLLOWED,
-    MULTIPLE,
-    NEWTON_STEPS,
-    NEXT,
-    OUTCOME,
-    RESTS,
-    UNDECIDED,
-    Searches,
-    search_orbits,
-)
+from hybridsim.ensemble.search import MAX_PERIODS, MOST_FOLLOWED, Searches, search_orbits
 
 _FEWEST = 4  # periods that are needed for a decision
 _GROUP_SIZE = 256  # points of one compiled call
@@ -47,7 +36,7 @@ class Orbits(NamedTuple):
     followed: np.ndarray  # (m,) periods of the forcing that were followed
     starts: np.ndarray  # states (m, n) at the start of the period
     modes: np.ndarray  # modes (m, C) there
-    summary: MotionSummary  # the motion over the period
+    summary: PeriodSummary  # the motion over the period
 
 
 def steady_orbits(
@@ -66,60 +55,53 @@ def steady_orbits(
     """
     if first_periods > MOST_FOLLOWED:
         return
-    settings = tol, max(first_periods, _FEWEST), min(max_periods, MAX_PERIODS), (NODES, WEIGHTS)
-    starting = *ensemble.vector_positions, ensemble.surfaces, ensemble.hold
+    settings = tol, max(first_periods, _FEWEST), min(max_periods, MAX_PERIODS)
     for group in ensemble.groups(parameters, starts, _GROUP_SIZE, LONGEST_WORD):
-        searches = _searches(ensemble, group)
+        found = ensemble.summaries(group)
+        searches = _searches(group, found)
         under_way = packed(searches)
         with ensemble.scratch(group) as scratch:
+            scratch.link_search(under_way)
             while True:
-                _search(
-                    scratch.loop, scratch.lin_at, NOT_LINEAR, starting, under_way, scratch.search, settings
-                )
-                if searches.at[NEXT] == len(group.numbers) or not ensemble.may_continue():
+                arguments = NOT_LINEAR, scratch.fixed, under_way, scratch.search, settings
+                if _search(scratch.loop, *arguments):
+                    scratch.link_newton(under_way)
+                elif searches.at[NEXT] == len(group.numbers) or not ensemble.may_continue():
                     break
-        yield _decided(group, searches)
+        yield _decided(group, searches, found)
 
 
-def _searches(ensemble: Ensemble, group: Group) -> Searches:
-    m, n, count = len(group.numbers), ensemble.system.n, len(ensemble.hold)
+def _searches(group: Group, found: PeriodSummary) -> Searches:
+    m, n = group.points.starts.shape
     return Searches(
-        tables=group.tables.addresses,
-        vectors=group.vectors,
-        rates=group.rates,
-        starts=group.starts,
-        periods=group.periods,
-        longest=group.longest,
+        points=packed(group.points),
         counts=np.zeros((m, 4), dtype=np.int64),
         residuals=np.zeros(m),
         matrices=np.zeros((m, n, n)),
-        modes=np.zeros((m, count), dtype=np.int64),
-        extremes=np.empty((m, 2, n)),
-        integrals=np.empty((m, 2, n)),
-        sides=np.empty((m, 2, n)),
-        held=np.empty((m, 2, count)),
-        holding=np.empty((m, 2, count), dtype=np.bool_),
+        modes=np.zeros((m, found.held.shape[-1]), dtype=np.int64),
+        summaries=packed(found),
         at=np.zeros(2, dtype=np.int64),
     )
 
 
-def _decided(group: Group, searches: Searches) -> Orbits:
+def _decided(group: Group, searches: Searches, found: PeriodSummary) -> Orbits:
     counts = searches.counts
-    attracts = (np.abs(np.linalg.eigvals(searches.matrices)) <= _ATTRACTS).all(axis=1)
+    attracts = np.ones(len(counts), dtype=np.bool_)
+    by_newton = searches.matrices.any(axis=(1, 2))  # the others were reached by waiting
+    if by_newton.any():
+        multipliers = np.linalg.eigvals(searches.matrices[by_newton])
+        attracts[by_newton] = (np.abs(multipliers) <= _ATTRACTS).all(axis=1)
     done = (counts[:, OUTCOME] != UNDECIDED) & attracts
     counts = counts[done]
-    summary = (
-        searches.extremes, searches.integrals, searches.sides, searches.held, searches.holding
-    )  # fmt: skip
     return Orbits(
         group.numbers[done],
         counts[:, OUTCOME] == RESTS,
-        counts[:, MULTIPLE] * searches.periods[done],
+        counts[:, MULTIPLE] * group.points.periods[done],
         counts[:, MULTIPLE],
         searches.residuals[done],
         counts[:, NEWTON_STEPS],
         counts[:, FOLLOWED],
-        searches.starts[done],
+        group.points.starts[done],
         searches.modes[done],
-        MotionSummary(*(part[done] for part in summary)),
+        PeriodSummary(*(part[done] for part in found)),
     )

@@ -14,25 +14,13 @@ import numpy as np
 from hybridsim.engine.events.compiled.known_time import SEGMENTS as SEGMENTS_AT
 from hybridsim.engine.events.compiled.scratch import EVENT_LOOP
 from hybridsim.engine.linear.motion import functions_of_time, moved, slopes_of, states_of, to_modal
-from hybridsim.engine.native.kernels import call_kernel, inlined, kernel
+from hybridsim.engine.native.kernels import call_kernel, inline_always, inlined, kernel
 from hybridsim.engine.native.loop_hints import put
 from hybridsim.engine.native.simd.products import dot
 from hybridsim.engine.run.event_loop import AT_TARGET
-from hybridsim.engine.series.bounded import UNIT
+from hybridsim.ensemble.points import set_start_errors
 
 _WORD_FACTOR, _WORD_MASK = 1_000_003, (1 << 40) - 1
-
-
-class LoopPacks(NamedTuple):
-    """The packs of the compiled event loop for one model."""
-
-    model: Any  # `hybridsim.engine.run.event_loop.LoopModel`, whose tables are those of the present point
-    call: Any  # `LoopCall`
-    state: Any  # `StateArrays`
-    work: Any  # `EventScratch`
-    own: Any  # `hybridsim.integrators.closed_form.segments.ClosedFormArrays`
-    record: Any  # `LoopRecord`
-    rows: Any  # `ClosedFormRows`
 
 
 class MapScratch(NamedTuple):
@@ -54,9 +42,7 @@ def run_periods(packs: Any, length: float) -> int:
     """
     call, state = packs.call, packs.state
     call.times[0], call.times[1], call.times[2], call.times[3] = length, 0.0, 0.0, 0.0
-    for j in range(state.x.shape[0]):  # as `hybridsim.engine.events.start.start_errors`
-        x = state.x[j]
-        state.x_error[j] = 0.0 if x == round(x) else 2.0 * UNIT * abs(x)
+    set_start_errors(state)
     arguments = (packs.model, call, state, packs.work, packs.record, packs.own, packs.rows)
     code = call_kernel(packs.work.entry_points[EVENT_LOOP], arguments)
     return call.int_slots[SEGMENTS_AT] if code == AT_TARGET else 0
@@ -69,7 +55,7 @@ def begin_segment(state: Any) -> None:
         state.sides[g], state.orders[g], state.floors[g] = 1, 0, 0.0
 
 
-@inlined
+@inline_always
 def word_of(rows: Any, count: int) -> int:
     """Return a number that identifies the sequence of modes of recorded segments."""
     word = 1
@@ -89,7 +75,7 @@ def _hold(automata: Any, z: Any, matrix: Any) -> None:
                         matrix[automata.pin[c, j], i] = 0.0
 
 
-@kernel
+@inline_always
 def carry_derivative(packs: Any, lin: Any, count: int, scratch: Any) -> None:
     """Write the derivative of the last state of the recorded segments by the first state to `scratch.matrix`."""
     automata, record, rows, work, own = (
@@ -134,7 +120,7 @@ def carry_derivative(packs: Any, lin: Any, count: int, scratch: Any) -> None:
     _hold(automata, record.modes[count - 1], matrix)
 
 
-@inlined
+@inline_always
 def solve(rows: Any) -> bool:
     """Solve linear equations (n, n + 1) in place in the last column; return False if the matrix is singular."""
     n = rows.shape[0]

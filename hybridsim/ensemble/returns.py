@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from hybridsim.engine.native.kernels import inlined, kernel
+from hybridsim.engine.native.kernels import inline_always, inlined
 
 LONGEST_WORD = 12  # largest number of periods after which a motion may repeat
 _CLOSER = 1e-2  # multiple of the tolerance: below it, a change that no longer shrinks has converged
@@ -17,7 +17,7 @@ _DIGITS = 1e-3  # of its size: the least scale of a state
 _NOTHING_LEFT = 1e-13  # of the scale that a state once had
 
 
-@inlined
+@inline_always
 def measure_scale(extremes: Any, seen: Any, scale: Any) -> None:
     """Write the scale of each state from its extremes over a period, and update the largest scales so far."""
     for i in range(scale.shape[0]):
@@ -40,7 +40,7 @@ def relative_change(before: Any, after: Any, scale: Any) -> float:
     return largest
 
 
-@kernel
+@inline_always
 def repeats_after(states: Any, count: int, scale: Any, tol: float) -> int:
     """Return after how many of the last passages the states (count, n) repeat, or 0."""
     last = count - 1
@@ -58,7 +58,7 @@ def repeats_after(states: Any, count: int, scale: Any, tol: float) -> int:
     return 0
 
 
-@kernel
+@inline_always
 def nearest_return(states: Any, count: int, scale: Any) -> int:
     """Return after how many of the last passages the states (count, n) come close to repeating."""
     last, least = count - 1, math.inf
@@ -71,7 +71,7 @@ def nearest_return(states: Any, count: int, scale: Any) -> int:
     return 1
 
 
-@kernel
+@inline_always
 def periods_left(states: Any, count: int, m: int, scale: Any, tol: float) -> float:
     """Return the expected number of further periods until states that return after m periods have settled."""
     last = count - 1

@@ -10,11 +10,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hybridsim.engine.linear.motion_summary import NODES, WEIGHTS, MotionSummary
 from hybridsim.engine.native.kernels import Precompiled
 from hybridsim.engine.native.struct_pack import packed
 from hybridsim.engine.run.method_kernels import NOT_LINEAR
 from hybridsim.ensemble.group import Ensemble, Group
+from hybridsim.ensemble.points import PeriodSummary
 from hybridsim.ensemble.run import NEXT, Runs, run_ensemble
 
 _GROUP_SIZE = 128  # runs whose tables are made together, so that they fit in the processor's cache
@@ -27,7 +27,7 @@ class LastPeriods(NamedTuple):
 
     numbers: np.ndarray  # numbers (m,) of the runs
     periods: np.ndarray  # lengths (m,) of the periods
-    summary: MotionSummary  # the motion over the period, one row of each array per run
+    summary: PeriodSummary  # the motion over the period, one row of each array per run
 
 
 def last_periods(
@@ -39,34 +39,20 @@ def last_periods(
     ensemble returns False.
     """
     for group in ensemble.groups(parameters, starts, _GROUP_SIZE, periods):
-        runs = _runs(ensemble, group, periods)
+        found = ensemble.summaries(group)
+        runs = Runs(
+            points=packed(group.points),
+            ends=periods * group.points.periods,
+            done=np.zeros(len(group.numbers), dtype=np.bool_),
+            summaries=packed(found),
+            at=np.zeros(4, dtype=np.int64),
+        )
         _run_group(ensemble, group, runs)
-        summary = MotionSummary(runs.extremes, runs.integrals, runs.sides, runs.held, runs.holding)
         yield LastPeriods(
             group.numbers[runs.done],
-            runs.periods[runs.done],
-            MotionSummary(*(part[runs.done] for part in summary)),
+            group.points.periods[runs.done],
+            PeriodSummary(*(part[runs.done] for part in found)),
         )
-
-
-def _runs(ensemble: Ensemble, group: Group, periods: int) -> Runs:
-    m, n, count = len(group.numbers), ensemble.system.n, len(ensemble.hold)
-    return Runs(
-        tables=group.tables.addresses,
-        vectors=group.vectors,
-        rates=group.rates,
-        starts=group.starts,
-        ends=periods * group.periods,
-        periods=group.periods,
-        longest=group.longest,
-        done=np.zeros(m, dtype=np.bool_),
-        extremes=np.empty((m, 2, n)),
-        integrals=np.empty((m, 2, n)),
-        sides=np.empty((m, 2, n)),
-        held=np.empty((m, 2, count)),
-        holding=np.empty((m, 2, count), dtype=np.bool_),
-        at=np.zeros(4, dtype=np.int64),
-    )
 
 
 def _run_group(ensemble: Ensemble, group: Group, runs: Runs) -> None:
@@ -74,9 +60,6 @@ def _run_group(ensemble: Ensemble, group: Group, runs: Runs) -> None:
     under_way = packed(runs)
     with ensemble.scratch(group) as scratch:
         while True:
-            _run(
-                scratch.model, scratch.lin_at, NOT_LINEAR, ensemble.vector_positions, ensemble.surfaces,
-                ensemble.hold, (NODES, WEIGHTS), under_way, scratch.slopes, *scratch.packs,
-            )  # fmt: skip
+            _run(scratch.loop, NOT_LINEAR, scratch.fixed, under_way, *scratch.record, scratch.found)
             if runs.at[NEXT] == len(runs.ends) or not ensemble.may_continue():
                 break

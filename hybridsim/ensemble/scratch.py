@@ -7,39 +7,60 @@ from typing import Any
 
 import numpy as np
 
+from hybridsim.engine.events.compiled.start import surfaces_of
 from hybridsim.engine.events.outcome import Outcome
 from hybridsim.engine.events.state import HybridState
-from hybridsim.engine.linear.motion_summary import MotionSummary
+from hybridsim.engine.linear.motion_summary import NODES, WEIGHTS
+from hybridsim.engine.native.kernels import kernel_address
 from hybridsim.engine.native.simd.products import vector_of
-from hybridsim.engine.native.struct_pack import address_in, opaque, packed
+from hybridsim.engine.native.struct_pack import address_in, packed
 from hybridsim.engine.run.event_loop import LoopRecord, link_event_loop
-from hybridsim.engine.run.method_kernels import CallArrays
+from hybridsim.engine.run.method_kernels import NOT_LINEAR, CallArrays
 from hybridsim.engine.system.system import System
-from hybridsim.ensemble.period_map import LoopPacks, MapScratch
+from hybridsim.ensemble.newton import close_orbit
+from hybridsim.ensemble.period_map import MapScratch
+from hybridsim.ensemble.points import (
+    BEGIN,
+    NEWTON,
+    SEARCH,
+    SUMMARISE,
+    Fixed,
+    LoopPacks,
+    PeriodSummary,
+    Points,
+    begin_point,
+    summarise,
+)
 from hybridsim.ensemble.run import SEGMENTS
-from hybridsim.ensemble.search import MOST_FOLLOWED, SearchScratch
+from hybridsim.ensemble.search import MOST_FOLLOWED, SearchScratch, search_point
 from hybridsim.integrators.closed_form.compiled_loop import ClosedFormKernels
 from hybridsim.integrators.closed_form.segments import ClosedFormRows
 
 
 class GroupScratch:
-    """Scratch arrays for runs with tables of equal shapes, and packs of the arrays."""
+    """Scratch arrays for runs with tables of equal shapes, and packs of the arrays.
 
-    def __init__(self, system: System, tapes: Any, tables: Any, p: np.ndarray) -> None:
+    Parameters
+    ----------
+    tables : those of one point.
+    points, summaries : arrays like those of each group.
+
+    Attributes
+    ----------
+    loop, fixed, found, search : the packs `LoopPacks`, `Fixed`, `PeriodSummary` of one point, `SearchScratch`.
+    record : the packs `LoopRecord` and `ClosedFormRows` of twice as many segments as one compiled call has.
+    """
+
+    def __init__(
+        self, system: System, tapes: Any, tables: Any, points: Points, summaries: PeriodSummary
+    ) -> None:
         n, widest, count, whole = system.n, tables.values.shape[1], len(system.automata), np.int64
-        none, guards = np.zeros(0, dtype=whole), system.guard_count
-        blank = Outcome(
-            np.zeros(n), p.copy(), np.zeros(count, dtype=whole), np.ones(guards, dtype=whole),
-            np.zeros(guards, dtype=whole), none, none, np.zeros(n), np.zeros(guards), np.zeros(0),
-        )  # fmt: skip
-        kernels = ClosedFormKernels(system, math.inf)
-        kernels.lin = tables
-        arrays = CallArrays(kernels, HybridState.of(blank, p), tapes, tables)
-        size = 2 * SEGMENTS
+        size, layout = 2 * SEGMENTS, system.layout
+        arrays = _call_arrays(system, tapes, tables, points.vectors[0])
         record = LoopRecord(
             clocks=np.empty((size, 2)),
             modes=np.empty((size, count), dtype=whole),
-            vectors=np.empty((size, system.layout.size)),
+            vectors=np.empty((size, layout.size)),
             last_steps=np.empty(size, dtype=whole),
             fires=np.empty(size, dtype=whole),
             jumps=np.empty((size, 3, n)),
@@ -49,52 +70,90 @@ class GroupScratch:
             rows=np.empty(size, dtype=whole),
             coordinates=np.empty((size, widest), dtype=complex),
         )
-        found = MotionSummary(
-            extremes=np.empty((2, n)),
-            integrals=np.empty((2, n)),
-            ends=np.empty((2, n)),
-            held=np.empty((2, count)),
-            holding=np.empty((2, count), dtype=np.bool_),
-        )
         late, late_rows = (packed(type(part)(*(a[SEGMENTS:] for a in part))) for part in (record, rows))
-        link_event_loop(
-            kernels.loop,
-            arrays.model,
-            arrays.call,
-            arrays.as_packed,
-            arrays.work,
-            late,
-            arrays.own,
-            late_rows,
-        )
-        self.model = arrays.model
-        self.lin_at = address_in(arrays.model, "lin")
-        self.packs = (
-            arrays.as_packed, arrays.work, arrays.call, arrays.own, (late, opaque(arrays.own), opaque(late_rows)),
-            (packed(record), packed(rows)), packed(found),
-        )  # fmt: skip
-        self.slopes = np.zeros((3, n))
+        loop = arrays.model, arrays.call, arrays.as_packed, arrays.work
+        link_event_loop(ClosedFormKernels.loop, *loop, late, arrays.own, late_rows)
+        self.record = packed(record), packed(rows)
+        entry_points = self._entry_points = np.zeros(4, dtype=whole)
         self.loop = packed(
-            LoopPacks(arrays.model, arrays.call, arrays.as_packed, arrays.work, arrays.own, late, late_rows)
-        )
-        self.search = packed(
-            SearchScratch(
-                states=np.empty((MOST_FOLLOWED, n)),
-                modes=np.empty(count, dtype=whole),
-                scale=np.empty(n),
-                seen=np.empty(n),
-                rows=np.empty((n, n + 1)),
-                slopes=self.slopes,
-                map=packed(
-                    MapScratch(
-                        matrix=np.empty((n, n)),
-                        column=vector_of(n),
-                        after=vector_of(n),
-                        before_rates=vector_of(n),
-                        after_rates=vector_of(n),
-                        no_time=vector_of(len(tables.factors)),
-                    )
-                ),
-                summary=self.packs[-1],
+            LoopPacks(
+                *loop,
+                arrays.own,
+                late,
+                late_rows,
+                address_in(arrays.model, "lin"),
+                entry_points,
+                np.zeros((3, n)),
             )
         )
+        self.fixed = packed(_fixed(system))
+        self.found = packed(PeriodSummary(*(np.empty_like(part[0]) for part in summaries)))
+        self.search = packed(_search_scratch(n, count, len(tables.factors), self.found))
+        entry_points[BEGIN] = kernel_address(
+            begin_point, self.loop, NOT_LINEAR, self.fixed, packed(points), self.found, 0
+        )
+        entry_points[SUMMARISE] = kernel_address(
+            summarise, self.loop, self.fixed, late, late_rows, self.found, 0, 0, 0.0
+        )
+
+    def link_search(self, searches: Any) -> None:
+        """Compile the kernel that searches a motion, unless it is compiled."""
+        if self._entry_points[SEARCH] == 0:
+            self._entry_points[SEARCH] = kernel_address(
+                search_point, self.loop, self.fixed, searches, self.search, 0, 0.0, 0, 0
+            )
+
+    def link_newton(self, searches: Any) -> None:
+        """Compile the kernel of Newton's method."""
+        self._entry_points[NEWTON] = kernel_address(close_orbit, self.loop, searches, self.search, 0, 0, 0.0)
+
+
+def _fixed(system: System) -> Fixed:
+    """Return the arrays that all points have in common."""
+    layout, (constant, rows, derivatives, registers, owners) = system.layout, surfaces_of(system)
+    return Fixed(
+        positions=np.array([layout.origin_at, layout.phases_at, layout.pin_at], dtype=np.int64),
+        hold=np.array([a.hold for a in system.automata], dtype=np.int64),
+        constant=constant,
+        rows=rows,
+        derivatives=derivatives,
+        registers=registers,
+        owners=owners,
+        nodes=NODES,
+        weights=WEIGHTS,
+    )
+
+
+def _call_arrays(system: System, tapes: Any, tables: Any, p: np.ndarray) -> CallArrays:
+    """Return the arrays of a call of the event loop."""
+    none, count, guards = np.zeros(0, dtype=np.int64), len(system.automata), system.guard_count
+    blank = Outcome(
+        np.zeros(system.n), p.copy(), np.zeros(count, dtype=np.int64), np.ones(guards, dtype=np.int64),
+        np.zeros(guards, dtype=np.int64), none, none, np.zeros(system.n), np.zeros(guards), np.zeros(0),
+    )  # fmt: skip
+    kernels = ClosedFormKernels(system, math.inf)
+    kernels.lin = tables
+    return CallArrays(kernels, HybridState.of(blank, p), tapes, tables)
+
+
+def _search_scratch(n: int, components: int, monomials: int, found: Any) -> SearchScratch:
+    """Return scratch arrays of a search."""
+    return SearchScratch(
+        states=np.empty((MOST_FOLLOWED, n)),
+        modes=np.empty(components, dtype=np.int64),
+        scale=np.empty(n),
+        seen=np.empty(n),
+        last=np.empty(n),
+        rows=np.empty((n, n + 1)),
+        map=packed(
+            MapScratch(
+                matrix=np.empty((n, n)),
+                column=vector_of(n),
+                after=vector_of(n),
+                before_rates=vector_of(n),
+                after_rates=vector_of(n),
+                no_time=vector_of(monomials),
+            )
+        ),
+        found=found,
+    )

@@ -6,13 +6,13 @@ import math
 from typing import Any
 
 from hybridsim.engine.linear.motion import functions_of_time, to_modal
-from hybridsim.engine.native.kernels import call, kernel
+from hybridsim.engine.native.kernels import call, inline_always, kernel
 from hybridsim.engine.native.simd.products import LANES
 from hybridsim.engine.series.bounded import UNIT
 from hybridsim.engine.system.programs.modes_index import find_modes
 
 
-@kernel
+@inline_always
 def keeps_holding(tapes: Any, lin: Any, state: Any, work: Any, c: Any) -> bool:
     """Return whether nothing moves any more: all states are constant, and no guard passes zero.
 

@@ -14,9 +14,17 @@ from hybridsim.engine.linear.tables import (
 )
 from hybridsim.engine.linear.units import horizon_class
 from hybridsim.engine.native.struct_pack import packed
+from hybridsim.engine.run.method_kernels import NOT_LINEAR
 from hybridsim.engine.system.system import System
 
+_FIELDS = LinearTables._fields
 _COMPUTED = ("rates", "offsets", "weights")  # fields of the atoms that depend on the parameters
+_SHARED = ("kinds", "term_start", "sources", "factors", "phases")  # fields that all points have in common
+_HAS_MODES = np.array(
+    [name not in _COMPUTED + _SHARED for name in _FIELDS]
+)  # fields with a row for each mode
+_ITEM_SIZES = np.array([getattr(NOT_LINEAR, name).itemsize for name in _FIELDS])  # bytes
+_KINDS, _FACTORS, _VALUES = (_FIELDS.index(name) for name in ("kinds", "factors", "values"))
 
 
 class EnsembleTables:
@@ -25,45 +33,44 @@ class EnsembleTables:
     Parameters
     ----------
     numbers : of the points (m,).
-    fields : the fields of the tables by name; those that differ between points are stacked along the first axis.
+    tables : a pack with the rows of all points, one point behind the other.
+    computed : the fields `_COMPUTED` of all points, by name; one row for each point.
     modes : the number of vectors of modes.
 
     Attributes
     ----------
-    first : the tables of the first point, whose type is that of all points, for kernels.
+    form : the sizes of the tables of a point.
     addresses : addresses (m,) of the packed tables of all points.
     """
 
-    def __init__(self, numbers: np.ndarray, fields: dict[str, np.ndarray], modes: int) -> None:
+    def __init__(self, numbers: np.ndarray, tables: Any, computed: dict[str, np.ndarray], modes: int) -> None:
+        count = len(numbers)
         self.numbers = numbers
-        self.form = len(fields["kinds"]), len(fields["factors"]), modes, fields["values"].shape[1]
-        counts = {name: modes if name not in _COMPUTED else 1 for name in LinearTables._fields}
-        shared = {name for name in LinearTables._fields if _is_shared(name)}
-        self._arrays = fields  # keep the arrays alive, because the packs hold only addresses
-        self.first: Any = packed(
+        self._tables, self._computed = tables, computed  # kept alive, because packs hold only addresses
+        whole = tables.table.reshape(len(_FIELDS), -1)  # an address and a shape for each field
+        self.form = int(whole[_KINDS, 1]), int(whole[_FACTORS, 1]), modes, int(whole[_VALUES, 2])
+        steps = np.where(_HAS_MODES, whole[:, 1:].clip(1).prod(axis=1) // count * _ITEM_SIZES, 0)
+        rows = np.tile(whole, (count, 1, 1))
+        rows[:, _HAS_MODES, 1] = modes
+        for name, array in computed.items():
+            k = _FIELDS.index(name)
+            rows[:, k, 0], steps[k] = array.__array_interface__["data"][0], array.strides[0]
+        rows[:, :, 0] += np.arange(count)[:, None] * steps
+        self._rows = rows
+        self.addresses = rows.ctypes.data + np.arange(count) * rows.strides[0]
+
+    def first(self) -> Any:
+        """Return a copy of the tables of the first point, with the shapes and the type of those of all points."""
+        modes, found = self.form[2], {name: getattr(self._tables, name) for name in _FIELDS}
+        found |= {name: array[0] for name, array in self._computed.items()}
+        return packed(
             LinearTables(
                 **{
-                    name: array
-                    if name in shared
-                    else array[0]
-                    if name in _COMPUTED
-                    else array[: counts[name]]
-                    for name, array in fields.items()
+                    name: array[:modes].copy() if of_modes else array.copy()
+                    for (name, array), of_modes in zip(found.items(), _HAS_MODES, strict=True)
                 }
             )
         )
-        steps = [
-            0 if name in shared else fields[name].strides[0] * counts[name] for name in LinearTables._fields
-        ]
-        rows = np.tile(self.first.table, (len(numbers), 1))
-        by_array = rows.reshape(len(numbers), len(steps), -1)
-        by_array[:, :, 0] += np.arange(len(numbers))[:, None] * np.array(steps, dtype=np.int64)
-        self._rows = rows
-        self.addresses = rows.ctypes.data + np.arange(len(numbers)) * rows.strides[0]
-
-
-def _is_shared(name: str) -> bool:
-    return name in ("kinds", "term_start", "sources", "factors", "phases")
 
 
 def ensemble_tables(
@@ -77,8 +84,11 @@ def ensemble_tables(
     classes = np.array([horizon_class(float(h)) for h in horizons])
     groups, left = [], np.arange(len(parameters))
     while len(left):
-        template, _ = template_of(system, modes, parameters[left[0]])
-        registers, holds = template.recipe.values_at(parameters[left])
+        template, of_first = template_of(system, modes, parameters[left[0]])
+        if len(left) == 1:
+            registers, holds = of_first[None], np.array([True])
+        else:
+            registers, holds = template.recipe.values_at(parameters[left])
         chosen, registers = left[holds], registers[holds]
         for horizon in np.unique(classes[chosen]):
             among = classes[chosen] == horizon
@@ -102,8 +112,7 @@ def _group(
     A, rows, usable = (part[np.repeat(known, modes)] for part in (A, rows, usable))
     if not len(numbers):
         return None
-    first, _ = of_matrices(template.atoms(registers[0]), A, rows, usable, system.n, horizon)
-    fields = {name: getattr(first, name) for name in LinearTables._fields}
-    atoms = zip(LinearTables._fields, template.atoms(registers), strict=False)
-    fields |= {name: np.ascontiguousarray(array) for name, array in atoms if name in _COMPUTED}
-    return EnsembleTables(numbers, fields, modes)
+    tables, _ = of_matrices(template.atoms(registers[0]), A, rows, usable, system.n, horizon)
+    atoms = zip(_FIELDS, template.atoms(registers), strict=False)
+    computed = {name: np.ascontiguousarray(array) for name, array in atoms if name in _COMPUTED}
+    return EnsembleTables(numbers, tables, computed, modes)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any
 
 from hybridsim.analysis.steady.measures import Measures
+from hybridsim.analysis.steady.over_run import OverRun
 from hybridsim.analysis.steady.result import SteadyState
 from hybridsim.analysis.steady.steady_state import steady_state
 from hybridsim.analysis.time_budget import Stopwatch
@@ -42,28 +42,6 @@ Number = float | complex
 
 class NoAnswer(Exception):
     """Raised if a motion has no value of the requested quantity; the text gives the reason."""
-
-
-class OverRun(Measures):
-    """The measures of a steady state, computed over a whole run instead of a period."""
-
-    period = math.nan
-
-    def __init__(self, solution: Solution) -> None:
-        self.solution = solution
-
-    def _extreme(self, name: str, side: int) -> float:
-        """Return the least or greatest value of one quantity, without a search over all other quantities."""
-        if name not in self._alone:
-            orbit = self._orbit
-            q = slice(orbit.column(name), orbit.column(name) + 1)
-            one = replace(orbit, names=(name,), values=orbit.values[:, :, q], is_smooth=orbit.is_smooth[:, q])
-            self._alone[name] = tuple(float(ends[0]) for ends in one.extremes)
-        return self._alone[name][side]
-
-    @cached_property
-    def _alone(self) -> dict[str, tuple[float, ...]]:
-        return {}
 
 
 @dataclass(frozen=True)

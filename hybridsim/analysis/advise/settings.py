@@ -16,8 +16,9 @@ from hybridsim.analysis.advise.ladder import (
     Watch,
     relative_error,
 )
-from hybridsim.analysis.advise.question import Answer, NoAnswer, Number, OverRun, Question
+from hybridsim.analysis.advise.question import Answer, NoAnswer, Number, Question
 from hybridsim.analysis.compare.rows import NOT_STARTED, STOPPED
+from hybridsim.analysis.steady.over_run import OverRun
 from hybridsim.analysis.time_budget import OutOfTime, Stopwatch
 from hybridsim.errors import HybridsimError, UsageError
 from hybridsim.model import Model

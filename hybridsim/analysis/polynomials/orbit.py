@@ -75,7 +75,7 @@ class Orbit:
         """Return the values (K, POINTS) of one quantity at the Gauss points."""
         return self.values[:, :, self.column(name)]
 
-    def _series(self, name: str) -> np.ndarray:
+    def series(self, name: str) -> np.ndarray:
         """Return the Legendre coefficients (K, POINTS) of one quantity."""
         return self.of(name) @ TO_COEFFICIENTS.T
 
@@ -87,7 +87,7 @@ class Orbit:
         """Return the amplitude c of q = Re(c exp(i w t)) by an integral over the orbit; for w = 0, c is the mean."""
         total = 0.0 + 0.0j
         parts = max(1, int(np.ceil(frequency * self.lengths.max() / POINTS * 2.0)))
-        coefficients = self._series(name)
+        coefficients = self.series(name)
         for part in range(parts):  # shorter pieces, so that a fast wave is resolved on each
             local = (2.0 * part + 1.0 + NODES) / parts - 1.0
             values = coefficients @ legendre.legvander(local, POINTS - 1).T
@@ -141,7 +141,7 @@ class Orbit:
 
     def passes(self, name: str, level: float, upward: bool = True) -> np.ndarray:
         """Return the times, from the start of the run, at which a quantity passes a level in a direction."""
-        series = self._series(name)
+        series = self.series(name)
         series[:, 0] -= level
         series *= 1.0 if upward else -1.0
         values = series @ _VALUES_ON_GRID.T

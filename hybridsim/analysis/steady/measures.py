@@ -157,6 +157,11 @@ class Measures:
         """Integral of q^2 over the period (He et al. 2026, eq. 5)."""
         return self._each("energy", lambda q: self._orbit.integral(self._orbit.of(q) ** 2))
 
+    @property
+    def rms(self) -> ByName:
+        """Root of the mean square of each quantity over the period."""
+        return self._each("rms", lambda q: math.sqrt(self.energy[q] / self._orbit.duration))
+
     def harmonic(self, name: str, k: int = 1) -> complex:
         """Return the amplitude c_k of q(t) = c_0 + sum of Re(c_k exp(2 pi i k t/T)), with the forcing's time t.
 
@@ -207,6 +212,23 @@ class Measures:
     def _stuck(self, contact: str) -> float:
         hold = self.held_mode(contact)
         spent = sum(i.t1 - i.t0 for i in self.solution.modes[contact] if i.mode == hold)
+        return spent / (self.solution.t_end - self.solution.t_start)
+
+    @property
+    def mode_fraction(self) -> ByName:
+        """Fraction of the period that each component spends in each mode, by names such as "f.slip+"."""
+        return ByName(
+            lambda: (self._modes, frozenset()), self._spent_in, "mode", self._summed("mode_fraction")
+        )
+
+    @cached_property
+    def _modes(self) -> tuple[str, ...]:
+        declared = self.solution._system.declared
+        return tuple(f"{automaton.name}.{mode}" for automaton in declared for mode in automaton.modes)
+
+    def _spent_in(self, name: str) -> float:
+        component, _, mode = name.rpartition(".")
+        spent = sum(i.t1 - i.t0 for i in self.solution.modes[component] if i.mode == mode)
         return spent / (self.solution.t_end - self.solution.t_start)
 
     def held_mode(self, contact: str) -> str:

@@ -1,4 +1,4 @@
-"""This module reads amplitudes, energies and stick fractions from summaries of closed-form motions over a period."""
+"""This module reads amplitudes, energies and times in modes from summaries of closed-form motions over a period."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 if TYPE_CHECKING:
-    from hybridsim.engine.linear.motion_summary import MotionSummary
     from hybridsim.engine.system.system import System
+    from hybridsim.ensemble.points import PeriodSummary
 
-_OF_STATES = ("amplitude", "peak", "maximum", "minimum", "mean", "energy")
+_OF_STATES = ("amplitude", "peak", "maximum", "minimum", "mean", "rms", "energy")
 _OF_CONTACTS = ("stick_fraction", "stops_per_period")
 
 
@@ -23,7 +23,7 @@ class Summarised(Protocol):
         """Lengths (m,) of the periods."""
 
     @property
-    def summary(self) -> MotionSummary:
+    def summary(self) -> PeriodSummary:
         """The summaries, one row of each array per point."""
 
 
@@ -38,12 +38,18 @@ def period_reader(word: str, system: System) -> Reader | None:
     contacts = [automaton.name for automaton in system.automata]
     if head in _OF_CONTACTS and name in contacts:
         return _of_contact(head, contacts.index(name))
+    component, _, mode = name.rpartition(".")
+    if head == "mode_fraction" and component in contacts:
+        c = contacts.index(component)
+        modes = system.automata[c].modes
+        return _of_mode(c, modes.index(mode)) if mode in modes else None
     return None
 
 
 def summed(head: str, found: Summarised, system: System) -> dict[str, float]:
-    """Return the values of one measure of states or contacts for the motion of a single point."""
-    names = [*system.names, *(automaton.name for automaton in system.automata)]
+    """Return the values of one measure of states, contacts or modes for the motion of a single point."""
+    modes = [f"{automaton.name}.{mode}" for automaton in system.automata for mode in automaton.modes]
+    names = [*system.names, *(automaton.name for automaton in system.automata), *modes]
     readers = {name: period_reader(f"{head}.{name}", system) for name in names}
     return {name: float(read(found)[0]) for name, read in readers.items() if read is not None}
 
@@ -59,6 +65,10 @@ def _of_contact(head: str, c: int) -> Reader:
     return stick_fraction if head == "stick_fraction" else stops_per_period
 
 
+def _of_mode(c: int, mode: int) -> Reader:
+    return lambda found: np.asarray(found.summary.times[:, c, mode] / found.periods)
+
+
 def _of_state(head: str, i: int) -> Reader:
     def read(found: Summarised) -> np.ndarray:
         low, high = found.summary.extremes[:, :, i].T
@@ -69,6 +79,8 @@ def _of_state(head: str, i: int) -> Reader:
             return np.maximum(np.abs(low), np.abs(high))
         if head == "mean":
             return np.asarray(whole / found.periods)
+        if head == "rms":
+            return np.sqrt(squares / found.periods)
         return {"maximum": high, "minimum": low, "energy": squares}[head]
 
     return read

@@ -1,4 +1,4 @@
-"""This module defines the built-in measures: properties of the steady state, and final states."""
+"""This module selects the built-in measures by their names, and defines that of steady states."""
 
 from __future__ import annotations
 
@@ -22,20 +22,27 @@ from hybridsim.analysis.steady.together import (
     steady_motions,
 )
 from hybridsim.analysis.sweep.last_period import OF_MOTION, LastPeriod, MeasuredPeriod, period_of
+from hybridsim.analysis.sweep.run_readings import (
+    FINAL,
+    FIRST_PASSAGE,
+    OF_MODE,
+    OF_QUANTITY,
+    OfRun,
+    modes_of,
+    of_run,
+)
 from hybridsim.analysis.sweep.work.job import Incomplete, Job, Outcome, Settings, Together, Watch
 from hybridsim.analysis.sweep.work.together import PointsTogether
-from hybridsim.arguments import cannot_be
-from hybridsim.calls import Default
 from hybridsim.engine.system.system import System
 from hybridsim.engine.system.system_cache import system_of
-from hybridsim.errors import SimulationError, UsageError, nearest
+from hybridsim.errors import UsageError, nearest
 from hybridsim.model import Model
 from hybridsim.model.checks.units import time_unit, units_of
 from hybridsim.simulate import simulate
 
-STEADY, FINAL, AFTER = "steady", "final", "after"
+STEADY, AFTER, T_SPAN = "steady", "after", "t_span"
 # measures of a steady state: of a quantity, of a contact, of the motion
-_OF_QUANTITY = ("amplitude", "peak", "maximum", "minimum", "mean", "energy", "harmonic")
+_OF_QUANTITY = (*OF_QUANTITY, "harmonic")
 _OF_CONTACT = ("stick_fraction", "stops_per_period", "dissipated")
 _OF_MOTION = ("period", "multiple", "residual", "newton_steps", "periods", "kind", "word", "stable")
 _TEXTS = ("kind", "word")
@@ -98,58 +105,26 @@ class Steady:
         return ("period",) if result.kind == "equilibrium" else ()
 
 
-@dataclass(frozen=True)
-class Final:
-    """A measure that reads the states at the end of a run of `simulate`."""
-
-    names: tuple[str, ...]
-    options: Mapping[str, Any]
-
-    def nothing(self) -> dict[str, float | str]:
-        """Return the values stored for a point that has no result."""
-        return {f"{FINAL}.{name}": math.nan for name in self.names}
-
-    def run(self, model: Model, previous: Any) -> dict[str, float]:
-        """Return the final states by name; with `warm_start`, the run begins at the previous end."""
-        arguments = {"keep": Default("nothing"), **self.options}
-        if previous is not None:
-            arguments["x0"] = previous
-        solution = simulate(model, **arguments)
-        if not solution.success:
-            raise SimulationError(f"{solution.status}: {solution.message}")
-        return dict(zip(solution.names, solution.y[:, -1].tolist(), strict=True))
-
-    def read(self, result: dict[str, float]) -> dict[str, float]:
-        """Return the requested final states."""
-        return {f"{FINAL}.{name}": result[name] for name in self.names}
-
-
 def named_measure(
     reading_names: str | Sequence[str], model: Model, options: Mapping[str, Any]
-) -> Steady | Final | LastPeriod:
+) -> Steady | OfRun | LastPeriod:
     """Return a measure by its name, "steady" or "final", or by the names of its values.
+
+    With `t_span` among the options the values are those of a run, otherwise those of a steady state.
 
     Raises
     ------
     UsageError
-        For unknown names, or readings of both kinds together.
+        For unknown names, or readings of runs and of steady states together.
     """
     asked = (reading_names,) if isinstance(reading_names, str) else tuple(reading_names)
-    states = [state.name for state in model.states]
-    heads = {word.partition(".")[0] for word in asked}
-    if heads == {FINAL}:
-        if "t_span" not in options:
-            raise UsageError(
-                f"`measure` {reading_names!r} needs `t_span`", remedy="pass `t_span`, such as t_span=(0, 10)"
-            )
+    of_runs = [word for word in asked if word.partition(".")[0] in (FINAL, FIRST_PASSAGE, "stops")]
+    if T_SPAN in options and AFTER not in options and asked != (STEADY,):
         refuse_unknown([simulate], options)
-        names = states if asked == (FINAL,) else [_of(word, states, "states") for word in asked]
-        return Final(tuple(names), options)
-    if FINAL in heads:
-        raise cannot_be(
-            "measure",
-            reading_names,
-            "use two sweeps: one for values of steady states, and one for ends of runs",
+        return of_run(asked, model, options)
+    if of_runs:
+        raise UsageError(
+            f"`measure` {of_runs[0]!r} needs `t_span`", remedy="pass `t_span`, such as t_span=(0, 10)"
         )
     if AFTER in options:
         refuse_unknown([simulate], {name: value for name, value in options.items() if name != AFTER})
@@ -197,7 +172,7 @@ def units_of_readings(reading_names: Iterable[str], model: Model) -> dict[str, s
     units = {}
     for word in reading_names:
         head, _, rest = word.partition(".")
-        if head == "period":
+        if head == "period" or head == FIRST_PASSAGE:
             units[word] = time
         elif head in (*_OF_QUANTITY, FINAL):
             unit = known.get(rest.rpartition(".")[0] if head == "harmonic" else rest, "")
@@ -213,14 +188,8 @@ def _known(model: Model, of_motion: Sequence[str]) -> list[str]:
     contacts = [contact.name for contact in model.contacts]
     numbered = {"harmonic": ".1"}
     found = [f"{head}.{name}{numbered.get(head, '')}" for head in _OF_QUANTITY for name in quantities]
-    return [*found, *(f"{head}.{name}" for head in _OF_CONTACT for name in contacts), *of_motion]
-
-
-def _of(word: str, names: Sequence[str], kind: str) -> str:
-    name = word.partition(".")[2]
-    if name not in names:
-        raise UsageError(f"there is no measure {word!r}", remedy=nearest(name, names, kind=kind))
-    return name
+    of_modes = [f"{OF_MODE}.{name}" for name in modes_of(model)]
+    return [*found, *(f"{head}.{name}" for head in _OF_CONTACT for name in contacts), *of_modes, *of_motion]
 
 
 def _steady_reader(word: str, system: System) -> Reader | None:

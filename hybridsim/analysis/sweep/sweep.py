@@ -17,8 +17,9 @@ from hybridsim.analysis.progress import Progress
 from hybridsim.analysis.sweep.axes import points_of
 from hybridsim.analysis.sweep.journal import Journal, fingerprint
 from hybridsim.analysis.sweep.last_period import LastPeriod
-from hybridsim.analysis.sweep.named_measures import Final, Steady, named_measure, units_of_readings
+from hybridsim.analysis.sweep.named_measures import Steady, named_measure, units_of_readings
 from hybridsim.analysis.sweep.result import Sweep
+from hybridsim.analysis.sweep.run_readings import OfRun
 from hybridsim.analysis.sweep.work.job import Job, Measure, new_token
 from hybridsim.analysis.sweep.work.measure import work
 from hybridsim.arguments import callback, cannot_be, chosen_model, flag, is_row
@@ -91,8 +92,9 @@ def sweep(
     measure : str, sequence of str or callable
         A function of the model that returns a number, a one-dimensional array, or a dict of these by name; or
         "steady" for the results of `steady_state`; or "final" for the states at the end of a run over
-        ``t_span``; or names of readings of these: ``["amplitude.x", "stick_fraction.f", "harmonic.x.3",
-        "kind"]``, ``"final.x"``.
+        ``t_span``; or names of readings of these: ``["amplitude.x", "rms.x", "mode_fraction.f.stick", "kind"]``,
+        ``"final.x"``. With ``t_span`` readings such as ``"maximum.x"``, ``"stops.f"`` and
+        ``"first_passage.x>0.1"`` are those of the whole run.
     mode : str, optional
         "grid", all combinations; "list", the k-th values of all together.
     params : mapping of str to str or float, optional
@@ -183,7 +185,7 @@ def sweep(
     )
     with Journal(journal, fingerprint(*asked)) if journal is not None else nullcontext() as file:
         collected, finished, who = work(job, points, executor, count, tell, file)
-    nothing = measured.nothing() if isinstance(measured, Steady | Final | LastPeriod) else None
+    nothing = measured.nothing() if isinstance(measured, Steady | OfRun | LastPeriod) else None
     found = collected.values(points.shape, nothing)
     known = {axis.name: axis.unit for axis in points.axes if axis.unit}
     if not callable(measure):

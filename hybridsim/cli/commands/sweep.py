@@ -33,7 +33,9 @@ examples:
   hybridsim sweep dfcs 'omega=0.2*sqrt(k/m):1.5*sqrt(k/m):66' N=20,30,40 --over omega
   hybridsim sweep dfcs F0=20:60:101 'omega=0.05*sqrt(k/m):2*sqrt(k/m):101' --measure amplitude.x --after 100
   hybridsim sweep belt v_belt=0.05:0.2:16 --measure final --t-end 50
+  hybridsim sweep dfcs F0=20:40:11 --measure 'maximum.x,first_passage.x>2e-4' --t-end 0.1
 """
+_OF_RUNS = ("final", "first_passage", "stops")  # measures that need --t-end
 _MOST_DRAWN = 2  # largest number of swept parameters in a picture
 
 
@@ -61,7 +63,8 @@ def add_to(commands: Any) -> None:
         "--measure",
         "A,B",
         "quantities of the steady state: steady (default) for the usual ones, or amplitude.x, energy.x, "
-        "harmonic.x.1, stick_fraction.f, period, kind, ...; or the states at --t-end: final, final.x",
+        "harmonic.x.1, stick_fraction.f, period, kind, ...; with --t-end of a run: final.x, maximum.x, rms.x, "
+        "stops.f, 'first_passage.x>0.1', ..., or final for all states",
         values.names,
         default=("steady",),
     )
@@ -70,7 +73,7 @@ def add_to(commands: Any) -> None:
         action="store_true",
         help="take the k-th values of all parameters together, instead of all combinations",
     )
-    options.add(parser, "--t-end", "TIME", "end time of each run, for --measure final")
+    options.add(parser, "--t-end", "TIME", "end time of each run, for measures of runs")
     options.add(
         parser,
         "--after",
@@ -115,14 +118,16 @@ def execute(args: argparse.Namespace, session: Session) -> int:
     settings: dict[str, Any] = {
         name: getattr(args, name) for name in ("integrator", "rtol") if getattr(args, name) is not None
     }
-    if any(word.partition(".")[0] == "final" for word in args.measure):
+    is_run = any(word.partition(".")[0] in _OF_RUNS for word in args.measure)
+    if is_run or (args.t_end is not None and tuple(args.measure) != ("steady",)):
         settings["t_span"] = (0.0, _end_of_all(model, args.t_end, axes))
         if args.after is not None:
             raise UsageError(
-                "--after cannot be combined with --measure final", remedy="remove --after or measure a period"
+                "--after cannot be combined with measures of runs",
+                remedy="remove --after or measure a period",
             )
     elif args.t_end is not None:
-        raise UsageError("--t-end requires --measure final", remedy="remove --t-end or add --measure final")
+        raise UsageError("--t-end requires measures of runs", remedy="remove --t-end or add --measure final")
 
     if args.after is not None:
         settings["after"] = args.after

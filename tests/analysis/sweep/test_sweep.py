@@ -131,6 +131,16 @@ def test_pieces_hold_every_point_once() -> None:
         assert sorted(seen) == list(range(total))
 
 
+def test_batches_take_long_enough_to_outweigh_their_cost() -> None:
+    """At 1e-4 s a point, batches of 0.01 s to 0.1 s have 100 to 1000 points; the first sizes grow towards that."""
+    batches, sizes = Batches(3000, None, 2), []
+    while (piece := batches.next()) is not None:
+        sizes.append(len(piece))
+        batches.learn(len(piece), 1e-4 * len(piece))
+    assert len(sizes) < 20 and sizes[0] == 1 and max(sizes) <= 1000
+    assert min(sizes[4:-1]) >= 100
+
+
 def test_chains_run_along_the_first_axis() -> None:
     loads = [1.0, 2.0, -3.0, 4.0, 5.0]
     found = hs.sweep("dfcs", {"F0": loads, "omega": OMEGA}, longer, warm_start=True)

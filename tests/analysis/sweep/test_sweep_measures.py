@@ -71,7 +71,7 @@ def test_the_end_of_a_run() -> None:
         ("stick_fraction.x", {}, "no measure 'stick_fraction.x'"),
         ("final", {}, "needs `t_span`"),
         ("final.y", {"t_span": (0, 1)}, "no measure 'final.y'"),
-        (["final.x", "period"], {"t_span": (0, 1)}, "two sweeps"),
+        (["final.x", "period"], {"t_span": (0, 1)}, "no measure 'period' of a run"),
         ([], {}, r"`measure` cannot be \[\]"),
     ],
 )

@@ -9,6 +9,10 @@ import numpy as np
 # Seconds per batch: a thousand times the cost of sending one, and short enough for ten reports of progress a
 # second.
 _SECONDS = 0.1
+# Seconds of the shortest batches. Points that are measured together have tables in common, which take some
+# milliseconds of Python for each batch, and Python runs on one thread at a time.
+_SHORTEST = 0.01
+_GROWTH = 8  # largest factor from one size to the next, because the first points may not be typical
 
 
 class Batches:
@@ -25,7 +29,7 @@ class Batches:
 
     def __init__(self, total: int, chains: int | None, workers: int, done: np.ndarray | None = None) -> None:
         self._total, self._chains, self._workers = total, chains, workers
-        self._next, self._size = 0, 1
+        self._next, self._size, self._least = 0, 1, 1
         self._open = np.arange(total + 1) if done is None else np.append(np.flatnonzero(~done), total)
 
     def next(self) -> range | None:
@@ -40,7 +44,7 @@ class Batches:
         if left <= 0:
             return None
         # the last batches are small, so that the workers finish together
-        size = min(self._size, math.ceil(left / (2 * self._workers)))
+        size = min(self._size, max(self._least, math.ceil(left / (2 * self._workers))), left)
         first = int(self._open[start])
         while self._open[start + size - 1] != first + size - 1:  # consecutive points
             size -= 1
@@ -49,5 +53,7 @@ class Batches:
 
     def learn(self, points: int, seconds: float) -> None:
         """Adapt the batch size to the measured time per point."""
-        fitting = int(_SECONDS * points / seconds) if seconds > 0 else 2 * points
-        self._size = max(1, min(fitting, 2 * points if points >= self._size else self._size))
+        rate = points / seconds if seconds > 0 else math.inf
+        largest = _GROWTH * points if points >= self._size else self._size
+        self._size = max(1, int(min(_SECONDS * rate, largest)))
+        self._least = max(1, int(min(_SHORTEST * rate, self._size)))

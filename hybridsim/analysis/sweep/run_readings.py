@@ -1,0 +1,136 @@
+"""This module defines the measure of runs over a time span: final states, and statistics of the whole run."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from hybridsim.analysis.steady.over_run import OverRun
+from hybridsim.calls import Default
+from hybridsim.engine.system.system_cache import system_of
+from hybridsim.errors import SimulationError, UsageError, nearest
+from hybridsim.expr import Expression, evaluate, parse, require_names
+from hybridsim.model import Model
+from hybridsim.model.checks.units import units_of
+from hybridsim.simulate import simulate
+
+FINAL, FIRST_PASSAGE = "final", "first_passage"
+OF_QUANTITY = ("amplitude", "peak", "maximum", "minimum", "mean", "rms", "energy")
+OF_CONTACT = ("stick_fraction", "stops", "dissipated")
+OF_MODE = "mode_fraction"
+_PASSAGE = re.compile(r"first_passage\.([^<>]+)([<>])([^<>]+)")
+
+
+@dataclass(frozen=True)
+class Passage:
+    """The quantity, direction and level of a reading such as ``first_passage.x>0.1``."""
+
+    quantity: str
+    is_upward: bool
+    level: Expression
+
+
+@dataclass(frozen=True)
+class OfRun:
+    """A measure that reads a run of `simulate`: ``final.x``, ``maximum.x``, ``first_passage.x>0.1``, ..."""
+
+    reading_names: tuple[str, ...]
+    options: Mapping[str, Any]
+
+    def nothing(self) -> dict[str, float | str]:
+        """Return the values stored for a point that has no result."""
+        return dict.fromkeys(self.reading_names, math.nan)
+
+    def run(self, model: Model, previous: OverRun | None) -> OverRun:
+        """Return the run; with `warm_start`, it begins at the end of the previous one."""
+        arguments = dict(self.options)
+        heads = {word.partition(".")[0] for word in self.reading_names}
+        if heads == {FINAL}:
+            arguments = {"keep": Default("nothing"), **arguments}
+        if previous is not None:
+            arguments["x0"] = _end_of(previous)
+        solution = simulate(model, **arguments)
+        if not solution.success:
+            raise SimulationError(f"{solution.status}: {solution.message}")
+        return OverRun(solution, self._quantities)
+
+    def read(self, result: OverRun) -> dict[str, float]:
+        """Return the values in the order of their names."""
+        return {word: _reading(result, word) for word in self.reading_names}
+
+    @cached_property
+    def _quantities(self) -> tuple[str, ...]:
+        """The quantities of which the whole run is measured."""
+        passages = [p.quantity for word in self.reading_names if (p := passage_of(word))]
+        parts = [word.partition(".") for word in self.reading_names]
+        return tuple(dict.fromkeys([*passages, *(name for head, _, name in parts if head in OF_QUANTITY)]))
+
+
+def of_run(reading_names: Sequence[str], model: Model, options: Mapping[str, Any]) -> OfRun:
+    """Return the measure of some readings of runs; "final" alone stands for all states.
+
+    Raises
+    ------
+    UsageError
+        For unknown names.
+    """
+    states = [state.name for state in model.states]
+    if tuple(reading_names) == (FINAL,):
+        return OfRun(tuple(f"{FINAL}.{name}" for name in states), options)
+    quantities = _quantities_of(model)
+    known = [f"{FINAL}.{name}" for name in states]
+    known += [f"{head}.{name}" for head in OF_QUANTITY for name in quantities]
+    known += [f"{head}.{contact.name}" for head in OF_CONTACT for contact in model.contacts]
+    known += [f"{OF_MODE}.{name}" for name in modes_of(model)]
+    for word in reading_names:
+        passage = passage_of(word)
+        if passage is not None and passage.quantity in quantities:
+            require_names(passage.level, [parameter.name for parameter in model.parameters])
+        elif word not in known:
+            examples = [f"{FIRST_PASSAGE}.{name}>0.0" for name in quantities]
+            raise UsageError(
+                f"there is no measure {word!r} of a run",
+                remedy=nearest(word, [*known, *examples], kind="measures"),
+            )
+    return OfRun(tuple(reading_names), options)
+
+
+def passage_of(word: str) -> Passage | None:
+    """Return the parts of a reading of a first passage, or None for another reading.
+
+    Raises
+    ------
+    ExpressionError
+        For a level that is not an expression.
+    """
+    found = _PASSAGE.fullmatch(word)
+    return None if found is None else Passage(found[1], found[2] == ">", parse(found[3]))
+
+
+def modes_of(model: Model) -> list[str]:
+    """Return the names of all modes, such as "f.slip+"."""
+    return [f"{a.name}.{mode}" for a in system_of(model).declared for mode in a.modes]
+
+
+def _quantities_of(model: Model) -> list[str]:
+    discrete = {d.name for d in model.discrete}
+    return [name for name in units_of(model) if name not in discrete]
+
+
+def _reading(run: OverRun, word: str) -> float:
+    head, _, name = word.partition(".")
+    if head == FINAL:
+        return float(run.solution.y[run.solution.names.index(name), -1])
+    passage = passage_of(word)
+    if passage is not None:
+        level = evaluate(passage.level, run.solution.model.parameter_values())
+        return run.first_passage(passage.quantity, level, passage.is_upward)
+    return float(run.stops(name) if head == "stops" else getattr(run, head)[name])
+
+
+def _end_of(run: OverRun) -> dict[str, float]:
+    return dict(zip(run.solution.names, run.solution.y[:, -1].tolist(), strict=True))
