@@ -81,7 +81,6 @@ ARGUMENTS = {
     "engine/system/finite_differences.py::along": 10,
     "engine/system/finite_differences.py::run_differences": 12,
     "engine/system/tangents.py::run_tangents": 11,
-    "ensemble/run.py::run_ensemble": 16,
     "integrators/fixed_step/kernels.py::passed": 12,
     "integrators/fixed_step/moreau_kernels.py::moreau_step": 11,
     "integrators/fixed_step/moreau_kernels.py::moreau_steps": 16,

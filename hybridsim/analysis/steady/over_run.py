@@ -81,13 +81,13 @@ def first_passage(orbit: Orbit, level: float, sign: float) -> float:
 
     The orbit has one quantity. Where no polynomial represents it, the time is that of a Gauss point.
     """
-    pieces, local, values = _knots(orbit)
+    intervals, local, values = _knots(orbit)
     beyond = np.flatnonzero(sign * (values - level) > 0.0)
     if not len(beyond):
         return math.inf
-    j, k = int(beyond[0]), int(pieces[beyond[0]])
+    j, k = int(beyond[0]), int(intervals[beyond[0]])
     at = float(local[j])
-    if j == 0 or pieces[j - 1] != k:  # the run begins beyond the level, or the quantity jumps
+    if j == 0 or intervals[j - 1] != k:  # the run begins beyond the level, or the quantity jumps
         at = -1.0
     elif orbit.is_smooth[k, 0]:
         at = _zero(orbit.series(orbit.names[0])[k], level, float(local[j - 1]), at, sign)
@@ -101,15 +101,15 @@ def _knots(orbit: Orbit) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     ends = orbit.series(orbit.names[0])[smooth] @ legendre.legvander(_ENDS, len(NODES) - 1).T
     of_turns = 2.0 * (turns.t - orbit.starts[turns.piece]) / orbit.lengths[turns.piece] - 1.0
     is_known = smooth[turns.piece]
-    pieces = np.concatenate(
+    intervals = np.concatenate(
         [np.repeat(numbers[smooth], 2), turns.piece[is_known], np.repeat(numbers[~smooth], len(NODES))]
     )
     local = np.concatenate(
         [np.tile(_ENDS, int(smooth.sum())), of_turns[is_known], np.tile(NODES, int((~smooth).sum()))]
     )
     values = np.concatenate([ends.ravel(), turns.value[is_known], orbit.values[~smooth, :, 0].ravel()])
-    order = np.lexsort((local, pieces))
-    return pieces[order], local[order], values[order]
+    order = np.lexsort((local, intervals))
+    return intervals[order], local[order], values[order]
 
 
 def _zero(series: np.ndarray, level: float, low: float, high: float, sign: float) -> float:

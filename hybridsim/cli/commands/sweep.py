@@ -35,7 +35,7 @@ examples:
   hybridsim sweep belt v_belt=0.05:0.2:16 --measure final --t-end 50
   hybridsim sweep dfcs F0=20:40:11 --measure 'maximum.x,first_passage.x>2e-4' --t-end 0.1
 """
-_OF_RUNS = ("final", "first_passage", "stops")  # measures that need --t-end
+_NEEDS_T_END = ("final", "first_passage", "stops")  # measures that need --t-end
 _MOST_DRAWN = 2  # largest number of swept parameters in a picture
 
 
@@ -118,7 +118,7 @@ def execute(args: argparse.Namespace, session: Session) -> int:
     settings: dict[str, Any] = {
         name: getattr(args, name) for name in ("integrator", "rtol") if getattr(args, name) is not None
     }
-    is_run = any(word.partition(".")[0] in _OF_RUNS for word in args.measure)
+    is_run = any(word.partition(".")[0] in _NEEDS_T_END for word in args.measure)
     if is_run or (args.t_end is not None and tuple(args.measure) != ("steady",)):
         settings["t_span"] = (0.0, _end_of_all(model, args.t_end, axes))
         if args.after is not None:
