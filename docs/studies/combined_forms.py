@@ -14,6 +14,7 @@ import json
 import multiprocessing as mp
 import os
 import sys
+import textwrap
 import time
 from collections import Counter
 from itertools import combinations
@@ -197,9 +198,10 @@ def page(done: list[dict[str, Any]], draws: int) -> str:
         differ=kinds["differs"],
     )
     instants = sum(r.get("instants", 0) for r in runs)
-    out += f"There are {len(seeds)} structures with {draws} sets of numbers each, and each set runs by two "
-    out += "integrators. Without runs that have no model or no certain motion, these are "
-    out += f"{len(runs)} runs, with {instants} instants of events.\n\n"
+    counts = f"There are {len(seeds)} structures with {draws} sets of numbers each, and each set runs by two "
+    counts += "integrators. Without runs that have no model or no certain motion, these are "
+    counts += f"{len(runs)} runs, with {instants} instants of events."
+    out += textwrap.fill(counts, 118) + "\n\n"
     out += "| result | runs |\n| --- | --- |\n"
     out += "".join(f"| {kind} | {count} |\n" for kind, count in kinds.most_common())
     statuses = Counter((r["kind"], r["status"]) for r in runs if r["kind"] in ("refused", "stopped", "chose"))
