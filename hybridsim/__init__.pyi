@@ -7,6 +7,7 @@ from hybridsim.analysis import Comparison as Comparison
 from hybridsim.analysis import Equilibrium as Equilibrium
 from hybridsim.analysis import Fit as Fit
 from hybridsim.analysis import LawComparison as LawComparison
+from hybridsim.analysis import LawFits as LawFits
 from hybridsim.analysis import Linearization as Linearization
 from hybridsim.analysis import Record as Record
 from hybridsim.analysis import Sensitivities as Sensitivities
@@ -22,6 +23,7 @@ from hybridsim.analysis import compare_suite as compare_suite
 from hybridsim.analysis import continuation as continuation
 from hybridsim.analysis import equilibria as equilibria
 from hybridsim.analysis import fit as fit
+from hybridsim.analysis import fit_laws as fit_laws
 from hybridsim.analysis import frequency_response as frequency_response
 from hybridsim.analysis import linearize as linearize
 from hybridsim.analysis import sensitivities as sensitivities

@@ -37,6 +37,7 @@ _ALSO = {
     "name": ("quantity", "law"),
     "path": ("cannot be read", "states"),
     "data": ("the file",),
+    "held_out": ("data", "the file", "record"),
     "records": ("data", "the file", "column", "record"),
     "unknowns": ("unknown", "bound"),
     "starts": ("first guess",),
@@ -51,7 +52,7 @@ _ALSO = {
 }
 # Made by calls and not by users; errors.
 _RESULTS = {
-    *("Event", "Explanation", "SavedState", "Solution", "SteadyState", "Sweep", "LawComparison"),
+    *("Event", "Explanation", "SavedState", "Solution", "SteadyState", "Sweep", "LawComparison", "LawFits"),
     *(
         "Comparison",
         "SuiteComparison",
@@ -374,6 +375,14 @@ CALLS: dict[str, tuple[Callable[[], Callable[..., Any]], Callable[[], dict[str, 
     "fit": (
         lambda: hs.fit,
         lambda: {"model": tiny(), "records": {"t": [0, 1, 2], "x": [1, 2, 3]}, "unknowns": {"x(0)": (0, 2)}},
+    ),
+    "fit_laws": (
+        lambda: hs.fit_laws,
+        lambda: {
+            "model": "free-decay",
+            "records": {"t": [0, 0.1, 0.2, 0.3], "x": [1, 1, 1, 1]},
+            "laws": [("coulomb", {"mu": (0.1, 0.2)})],
+        },
     ),
     "Fit.interval": (lambda: fitted().interval, lambda: {"name": "x(0)"}),
     "Fit.solution": (lambda: fitted().solution, dict),

@@ -7,7 +7,7 @@ from hybridsim.analysis.compare.lines import Series
 from hybridsim.analysis.continuation import Branch, continuation
 from hybridsim.analysis.equilibria import Equilibrium, Linearization, equilibria, linearize
 from hybridsim.analysis.fit import Fit, Record, Unknown, fit
-from hybridsim.analysis.laws import LawComparison, compare_laws
+from hybridsim.analysis.laws import LawComparison, LawFits, compare_laws, fit_laws
 from hybridsim.analysis.steady import SteadyState, steady_state
 from hybridsim.analysis.suite import SuiteComparison, compare_suite
 from hybridsim.analysis.sweep import Sweep, bifurcation, frequency_response, sweep
@@ -20,6 +20,7 @@ __all__ = [
     "Equilibrium",
     "Fit",
     "LawComparison",
+    "LawFits",
     "Linearization",
     "Record",
     "Sensitivities",
@@ -36,6 +37,7 @@ __all__ = [
     "continuation",
     "equilibria",
     "fit",
+    "fit_laws",
     "frequency_response",
     "linearize",
     "sensitivities",

@@ -10,6 +10,7 @@ from hybridsim.plot.fit import fit
 from hybridsim.plot.friction_law import friction_law
 from hybridsim.plot.friction_loop import friction_loop
 from hybridsim.plot.law_comparison import law_comparison
+from hybridsim.plot.law_fits import law_fits
 from hybridsim.plot.phase_portrait import phase_portrait
 from hybridsim.plot.regularisation import regularisation
 from hybridsim.plot.style import save
@@ -31,6 +32,7 @@ __all__ = [
     "friction_law",
     "friction_loop",
     "law_comparison",
+    "law_fits",
     "mechanism",
     "phase_portrait",
     "regularisation",

@@ -72,19 +72,12 @@ def compare_laws(
         if name in options:
             raise UsageError(f"compare_laws() has no option `{name}`", remedy=f"remove `{name}`")
     model = chosen_model(model, params).with_start(**mapping(x0, "x0")).validate()
-    names = [declared.name for declared in model.contacts]
-    if contact is None:
-        if len(names) != 1:
-            remedy = f"pass `contact`, one of {', '.join(names)}" if names else "use a model with a contact"
-            raise UsageError(f"model {model.name} has {len(names)} contacts", remedy=remedy)
-        contact = names[0]
+    contact = contact_of(model, contact)
     quantities = [*(state.name for state in model.states), *(output.name for output in model.outputs)]
     if quantity is None:
         quantity = quantities[0]
     known_name(quantity, quantities, f"model {model.name} has no quantity", "quantities")
-    models = _models(
-        model, laws, known_name(contact, names, f"model {model.name} has no contact", "contacts")
-    )
+    models = models_under(model, laws, contact)
     period = forcing_period(model)
     t0, t1 = run_span(t_span, model.duration_value(), period)
     is_last_period = period is not None and t1 - t0 > period
@@ -98,7 +91,18 @@ def compare_laws(
     return LawComparison(model.title or model.name, contact, quantity, measured, tuple(rows))
 
 
-def _models(model: Model, laws: Iterable[Entry], contact: str) -> dict[str, Model]:
+def contact_of(model: Model, contact: Any) -> str:
+    """Return the name of a contact of a model; None is the only one."""
+    names = [declared.name for declared in model.contacts]
+    if contact is None:
+        if len(names) != 1:
+            remedy = f"pass `contact`, one of {', '.join(names)}" if names else "use a model with a contact"
+            raise UsageError(f"model {model.name} has {len(names)} contacts", remedy=remedy)
+        return names[0]
+    return known_name(contact, names, f"model {model.name} has no contact", "contacts")
+
+
+def models_under(model: Model, laws: Iterable[Entry], contact: str) -> dict[str, Model]:
     """Return the model under each law, by different labels."""
     if not is_row(laws):
         raise cannot_be("laws", laws, _LAWS)
