@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
+from hybridsim.analysis.fit.derivative_costs import DerivativeCosts
 from hybridsim.analysis.fit.record import Record
-from hybridsim.analysis.fit.slopes_of_run import NoDerivative, is_cheaper, slopes_of_run
+from hybridsim.analysis.fit.slopes_of_run import NoDerivative, slopes_of_run
 from hybridsim.analysis.fit.unknown import Unknown, start_of
+from hybridsim.analysis.time_budget import Stopwatch
 from hybridsim.model import Model
 from hybridsim.simulate import simulate
 from hybridsim.solution import Solution
@@ -19,6 +22,14 @@ _STEP = 1e-4  # of an unknown's size: difference quotients have errors of about 
 _OF_BOUNDS = 1e-3  # smallest size of an unknown, relative to the distance of its bounds
 _COARSE = 2e-2  # the same, to move jumps over samples
 _JUMP = 1e-6  # of a quantity's deviation: smaller differences of the sides of an event are no jump
+
+
+@dataclass(frozen=True)
+class _Point:
+    """The runs of all records with one set of coordinates, and the simulated values (m,) of the samples."""
+
+    runs: list[Solution]
+    values: np.ndarray
 
 
 class Residuals:
@@ -41,7 +52,11 @@ class Residuals:
         self._starts = {start_of(s.name): s.name for s in model.states}
         self.runs = 0
         self.without: dict[int, str] = {}  # numbers of the records without exact derivatives, and the reasons
-        self._latest: tuple[bytes, list[Solution]] = b"", []
+        self._costs = [DerivativeCosts() for _ in records]
+        self._points: dict[
+            bytes, _Point
+        ] = {}  # by coordinates: the latest point, and the one of the latest slopes
+        self._slopes: tuple[bytes, bool, np.ndarray] | None = None  # coordinates, `is_coarse`, derivatives
         self.failure: Solution | None = None  # the last run that did not reach the end of its record
         self.present = [np.isfinite(values) for record in records for values in record.columns.values()]
         counts = [sum(int(np.isfinite(v).sum()) for v in record.columns.values()) for record in records]
@@ -93,12 +108,26 @@ class Residuals:
 
     def predicted(self, coordinates: np.ndarray) -> np.ndarray:
         """Return the simulated value (m,) of each sample, or NaN after the end of a run that stopped early."""
-        values = self.values(coordinates)
-        runs = [self.solution(record, values) for record in self.records]
-        self._latest = coordinates.tobytes(), runs
-        return np.concatenate(
-            [self._samples(record, run) for record, run in zip(self.records, runs, strict=True)]
-        )
+        return self._point(coordinates).values
+
+    def _point(self, coordinates: np.ndarray) -> _Point:
+        """Return the runs with the given coordinates, which are simulated only once in a row."""
+        key = coordinates.tobytes()
+        if key not in self._points:
+            of_slopes = self._slopes[0] if self._slopes is not None else b""
+            self._points = {each: point for each, point in self._points.items() if each == of_slopes}
+            values = self.values(coordinates)
+            runs = [self._timed_run(number, values) for number in range(len(self.records))]
+            samples = [self._samples(record, run) for record, run in zip(self.records, runs, strict=True)]
+            self._points[key] = _Point(runs, np.concatenate(samples))
+        return self._points[key]
+
+    def _timed_run(self, number: int, values: Mapping[str, float]) -> Solution:
+        """Simulate the record of the given number, and note the time of the run."""
+        watch = Stopwatch()
+        solution = self.solution(self.records[number], values)
+        self._costs[number].add_run(watch.seconds)
+        return solution
 
     def _samples(self, record: Record, solution: Solution) -> np.ndarray:
         """Return the simulated values (m,) of the samples of one record."""
@@ -113,9 +142,7 @@ class Residuals:
 
     def has_jumps(self, coordinates: np.ndarray) -> bool:
         """Return whether a measured quantity jumps in a run, as a friction force does."""
-        values = self.values(coordinates)
-        for record in self.records:
-            solution = self.solution(record, values)
+        for record, solution in zip(self.records, self._point(coordinates).runs, strict=True):
             times = np.unique([event.t for event in solution.events])
             for name in record.columns if len(times) else ():
                 jumps = np.abs(solution.output(name, times, "+") - solution.output(name, times, "-"))
@@ -123,40 +150,45 @@ class Residuals:
                     return True
         return False
 
-    def slopes(self, coordinates: np.ndarray, base: np.ndarray, is_coarse: bool = False) -> np.ndarray:
+    def slopes(self, coordinates: np.ndarray, is_coarse: bool = False) -> np.ndarray:
         """Return the derivatives (m, n) of `predicted` by the coordinates.
 
         They are those of the runs. A record whose run has none gets central differences.
 
-        base : `predicted` at the coordinates.
         is_coarse : whether to use coarse differences, which include jumps. Their mean over neighbouring samples shows
             how the jumps move.
         """
+        key = coordinates.tobytes()
+        if self._slopes is not None and self._slopes[:2] == (key, is_coarse):
+            return self._slopes[2]
+        point = self._point(coordinates)
         if not is_coarse:
             self.without = {}
         parts = []
         for number, (begin, end) in enumerate(pairwise(self._rows)):
             part = None if is_coarse else self._exact(coordinates, number)
-            parts.append(
-                self._differences(coordinates, number, base[begin:end], is_coarse) if part is None else part
-            )
-        return np.concatenate(parts)
+            if part is None:
+                part = self._differences(coordinates, number, point.values[begin:end], is_coarse)
+            parts.append(part)
+        found = np.concatenate(parts)
+        self._slopes = key, is_coarse, found
+        return found
 
     def _exact(self, coordinates: np.ndarray, number: int) -> np.ndarray | None:
         """Return the derivatives (m, n) of the samples of one record, or None if there are none."""
-        record = self.records[number]
-        values = self.values(coordinates)
-        is_latest = self._latest[0] == coordinates.tobytes()
-        solution = self._latest[1][number] if is_latest else self.solution(record, values)
+        record, values, costs = self.records[number], self.values(coordinates), self._costs[number]
+        solution = self._point(coordinates).runs[number]
         present = {name: np.isfinite(measured) for name, measured in record.columns.items()}
-        if not is_cheaper(solution, len(values)):
+        if not costs.is_exact_cheaper(solution, len(values), lambda: self._timed_run(number, values)):
             self.without[number] = "they take less time"
             return None
+        watch = Stopwatch()
         try:
             found = slopes_of_run(solution, record, list(values), present)
         except NoDerivative as reason:
             self.without[number] = str(reason)
             return None
+        costs.add_exact(watch.seconds)
         units = [values[name] if unknown.log else 1.0 for name, unknown in self.unknowns.items()]
         return found * np.array(units)
 
@@ -177,7 +209,7 @@ class Residuals:
                 moved = coordinates.copy()
                 moved[k] += move
                 if low <= moved[k] <= high:
-                    run = self.solution(record, self.values(moved))
+                    run = self._timed_run(number, self.values(moved))
                     one_sided.append((self._samples(record, run) - base) / move)
             found[:, k] = _central(one_sided, is_coarse)
         return found

@@ -48,26 +48,19 @@ class Search:
         residuals = self.residuals
         weights = 1.0 / np.array([noise[name] for name in residuals.quantity])
         bounds = np.array([unknown.coordinate_bounds for unknown in residuals.unknowns.values()]).T
-        known: dict[bytes, np.ndarray] = {}
-
-        def predicted(x: np.ndarray) -> np.ndarray:
-            if x.tobytes() not in known:
-                known.clear()
-                known[x.tobytes()] = residuals.predicted(x)
-            return known[x.tobytes()]
 
         def weighted(x: np.ndarray) -> np.ndarray:
-            found: np.ndarray = (residuals.measured - predicted(x)) * weights
+            found: np.ndarray = (residuals.measured - residuals.predicted(x)) * weights
             return found
 
         def slopes(x: np.ndarray) -> np.ndarray:
             self._report(weighted(x))
-            found: np.ndarray = -residuals.slopes(x, predicted(x), is_coarse) * weights[:, None]
+            found: np.ndarray = -residuals.slopes(x, is_coarse) * weights[:, None]
             return np.where(np.isfinite(found), found, 0.0)
 
         if not slopes(guess).any():  # the method would divide by zero
             cost = 0.5 * float(np.sum(weighted(guess) ** 2))
-            same = predicted(guess)
+            same = residuals.predicted(guess)
             return OptimizeResult(
                 x=guess, cost=cost, status=1, message="no unknown has an effect", predicted=same
             )
@@ -75,7 +68,7 @@ class Search:
             weighted, guess, slopes, bounds, x_scale=residuals.sizes, loss=self._loss, max_nfev=self._most,
             xtol=1e-4 if is_coarse else 1e-10, ftol=1e-4 if is_coarse else 1e-12, gtol=None,
         )  # fmt: skip
-        result.predicted = predicted(result.x)
+        result.predicted = residuals.predicted(result.x)
         return result
 
     def _report(self, weighted: np.ndarray) -> None:

@@ -15,17 +15,6 @@ from hybridsim.analysis.variations.sensitivities import directions_by
 from hybridsim.errors import UsageError
 from hybridsim.solution import Solution
 
-# Processor times in milliseconds, from models with 0 to 140 events and 1 to 800 steps; only their ratios count.
-_RUN, _SEGMENT, _STEP = 1.5, 0.5, 0.09  # of exact derivatives: for each run, segment and step
-_SIMULATION, _SIMULATED_STEP = 0.5, 0.0015  # of a run with a compiled method
-
-
-def is_cheaper(solution: Solution, unknowns: int) -> bool:
-    """Return whether exact derivatives take less time than two runs for each unknown."""
-    steps = solution.stats["steps"]
-    exact = _RUN + _SEGMENT * len(solution._segments) + _STEP * steps
-    return exact < 2 * unknowns * (_SIMULATION + _SIMULATED_STEP * steps)
-
 
 class NoDerivative(Exception):
     """Raised if the run of a record has no derivative by an unknown; the text gives the reason."""

@@ -26,7 +26,7 @@ def summed_up(
     values = residuals.values(best.x)
     weights = 1.0 / np.array([noise[name] for name in residuals.quantity])
     off = residuals.measured - best.predicted
-    slopes = residuals.slopes(best.x, best.predicted) * weights[:, None]
+    slopes = residuals.slopes(best.x) * weights[:, None]
     slopes = np.where(np.isfinite(slopes), slopes, 0.0)
     names, sizes = list(values), residuals.sizes.copy()
     for k, (name, unknown) in enumerate(unknowns.items()):
