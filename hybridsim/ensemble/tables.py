@@ -90,9 +90,9 @@ def ensemble_tables(
         else:
             registers, holds = template.recipe.values_at(parameters[left])
         chosen, registers = left[holds], registers[holds]
-        for horizon in np.unique(classes[chosen]):
+        for horizon in sorted(set(classes[chosen].tolist())):
             among = classes[chosen] == horizon
-            made = _group(system, template, chosen[among], registers[among], float(horizon))
+            made = _group(system, template, chosen[among], registers[among], horizon)
             if made is not None:
                 groups.append(made)
         left = left[~holds]
