@@ -188,6 +188,14 @@ def test_a_maximum_at_which_a_block_rests_for_a_while() -> None:
     assert peak.by_parameter == pytest.approx(found.at(0.035, "x").by_parameter[0], rel=1e-12)
 
 
+def test_a_force_that_reaches_its_limit_at_each_release() -> None:
+    """The largest friction force is mu_s N, at many times that rounding does not tell apart: m does not change it."""
+    run = hs.simulate("dfcs-stribeck", (0, 0.74), rtol=1e-11)
+    found = hs.sensitivities(run, ["m", "N"]).of("maximum", "f")
+    largest = found.value / run.model.parameter_values()["N"]
+    assert found.by_parameter == pytest.approx([0.0, largest], rel=1e-9, abs=1e-6)
+
+
 def swinging(output: str) -> hs.Model:
     """An undamped oscillator that starts at rest, and an output of it."""
     return hs.Model(

@@ -29,7 +29,7 @@ from hybridsim.solution.quadrature import integral
 
 READINGS = ("minimum", "maximum", "amplitude", "integral", "mean")
 _AGREE = 1e-7  # of their sizes: derivatives at equal extreme values that differ by less are equal
-_ROUNDING = 1e-11  # of the size of the quantity, for a change of everything by its own size
+_ROUNDING = 1e-9  # of the size of the quantity, for a change of everything by its own size
 _LEAST = 1e-14  # the same for an integral of rounding errors
 _JUMPS = 1e-9  # of its size: a quantity that changes by less at an event does not jump
 
