@@ -108,7 +108,7 @@ class LawTable(Declared):
         """Convert the values of a table of two arguments to rows of floats, and check them."""
         if self.interpolation != LINEAR:
             raise self._fault(
-                "a table of two arguments cannot have cubic interpolation", 'set interpolation="linear"'
+                "`across` cannot be combined with cubic interpolation", 'set interpolation="linear"'
             )
         self._ascending("across_at")
         self._rows("values")

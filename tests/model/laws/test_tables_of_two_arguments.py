@@ -117,7 +117,7 @@ def test_the_file_holds_it(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "changed, message",
     [
-        ({"interpolation": "cubic"}, "cannot have cubic interpolation"),
+        ({"interpolation": "cubic"}, "`across` cannot be combined with cubic interpolation"),
         ({"across_at": (80.0, 20.0)}, "`across_at` is not ascending: 20 follows 80"),
         ({"across_at": (20.0, 50.0, 80.0)}, "`across_at` has 3 numbers, but a row of `values` has 2"),
         ({"values": ((0.5, 0.3), (0.4, 0.25))}, "`at` has 3 numbers, but `values` has 2"),
