@@ -58,7 +58,7 @@ def _order_in_range(built: Built, span: tuple[float, float]) -> int:
 
 
 class MechanicalRun:
-    """One run of a mechanical system, which the method `go` carries out."""
+    """One run of a mechanical system, which the method `go` carries out, or `begin` and `advance` in parts."""
 
     def __init__(self, built: Built, span: tuple[float, float], x: np.ndarray, rtol: float, atol: np.ndarray,
                  max_step: float, is_recorded: bool, limits: Limits = UNLIMITED) -> None:  # fmt: skip
@@ -69,6 +69,7 @@ class MechanicalRun:
         self.max_step, self.limits = max_step, limits
         self.state = new_state(built, self.order)
         self.scratch = new_scratch(built, self.order)
+        self._packs = tuple(packed(part) for part in (built.arrays, built.laws, self.state, self.scratch))
         self.state.x[:] = x.reshape(2, -1)[:, built.dofs]
         self.state.tolerance[:] = np.maximum(atol.reshape(2, -1)[:, built.dofs], 1e-300)
         self.state.clock[0] = span[0]
@@ -81,22 +82,30 @@ class MechanicalRun:
 
     def go(self, progress: Callable[[float], None] | None) -> None:
         """Run to the end of the span, or until no mode is admissible."""
-        arrays, laws = packed(self.built.arrays), packed(self.built.laws)
-        state, scratch = packed(self.state), packed(self.scratch)
         began, compiled = perf_counter(), seconds_compiling()
-        limit_monitor = LimitMonitor(self.limits, self.counters)
-        reach_kernels(self.state, arrays, laws, state, scratch)
+        self.begin()
+        self.advance(progress)
+        self.compile_time = seconds_compiling() - compiled
+        self.kernel_time = perf_counter() - began - self.compile_time
+
+    def begin(self) -> None:
+        """Compile the kernels if necessary, and find the modes at the start."""
+        self._limit_monitor = LimitMonitor(self.limits, self.counters)
+        reach_kernels(self.state, *self._packs)
         if ENABLED:
             self.state.kernels[codes.BERNSTEIN :], self._code = bernstein_code(self.order - 1)
-        self.code = self._resolve_start(arrays, laws, state, scratch)
+        self.code = self._resolve_start(*self._packs)
         self.first_modes = self.state.mode.copy()
         self.state.flags[FRESH], self.state.flags[RADIUS] = 1, _RADIUS
+
+    def advance(self, progress: Callable[[float], None] | None = None) -> None:
+        """Continue from the present time to the end of the span, or until no mode is admissible."""
         target = np.array([self.span[1], 0.0])
         while self.code in (codes.DONE, codes.FULL):
             record = self._record()
             until = int(self.state.counts[:2].sum()) + max(_WORK // len(self.built.dofs), 16)
             control = (self.rtol, self.max_step, self.order, self.is_recorded, until)
-            self.code = run(arrays, laws, state, scratch, packed(record), control, target)
+            self.code = run(*self._packs, packed(record), control, target)
             self._collect(record)
             if self.code != codes.FULL:
                 break
@@ -104,11 +113,15 @@ class MechanicalRun:
                 progress((self.time - self.span[0]) / (self.span[1] - self.span[0]))
             self._count()
             try:
-                limit_monitor.check()
+                self._limit_monitor.check()
             except LimitReached as reached:
                 self.code, self.limit_message = codes.LIMITED, str(reached)
-        self.compile_time = seconds_compiling() - compiled
-        self.kernel_time = perf_counter() - began - self.compile_time
+
+    def restart(self, span: tuple[float, float]) -> None:
+        """Begin a new record over another span with the present states and modes, after a run to its end."""
+        self.span, self.first_modes = span, self.state.mode.copy()
+        self.state.clock[:] = span[0], 0.0, 0.0, math.nan
+        self.segments, self.events, self.when = [], [], []
 
     def _count(self) -> None:
         """Update the counts of steps and events after a call of the kernel."""
