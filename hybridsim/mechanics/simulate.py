@@ -94,7 +94,7 @@ def simulate_mechanical(
         raise UsageError(
             f"`keep` cannot be {keep!r}", remedy="for a MechanicalSystem use 'all', 'events' or 'nothing'"
         )
-    start, relative = _start(system, x0), arguments.relative_tolerance(rtol)
+    start, relative = start_of(system, x0), arguments.relative_tolerance(rtol)
     absolute = _absolute(system, atol, relative, start)
     longest = arguments.step_bound(max_step, "max_step")
     refuse_endless(longest, span, "max_step")
@@ -121,7 +121,8 @@ def simulate_mechanical(
     return Solution(SeriesTrajectory(system, run, grid, str(keep), cost))
 
 
-def _start(system: MechanicalSystem, x0: Any) -> np.ndarray:
+def start_of(system: MechanicalSystem, x0: Any) -> np.ndarray:
+    """Return the initial positions and velocities (2n,): those of the system, as far as `x0` has no others."""
     names = (*system.names, *system.velocities)
     start = np.concatenate([system.q0, system.v0])
     if x0 is None:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.polynomial import legendre
@@ -52,6 +52,15 @@ def _misfits() -> tuple[np.ndarray, np.ndarray]:
 
 
 _SAMPLE_POINTS, _MISFITS = _misfits()
+
+
+class Sample(Protocol):
+    """The protocol of a function that evaluates named quantities at local times in given segments."""
+
+    @property
+    def names(self) -> tuple[str, ...]: ...
+    def __call__(self, index: np.ndarray, s: np.ndarray) -> np.ndarray:
+        """Return the values (k, Q) at local times s (k,) in segments index (k,)."""
 
 
 class Sampler:
@@ -140,10 +149,33 @@ class _Finished(NamedTuple):
 
 def orbit_of(solution: Solution, chosen: Sequence[str] | None = None) -> Orbit:
     """Return a forward run, or the saved part of it, as an `Orbit` of all or some quantities."""
-    sample = Sampler(solution, chosen)
     index, s, _ = solution._segments.knots()
     same = (index[1:] == index[:-1]) & (s[1:] > s[:-1])
-    steps = _Intervals(index[:-1][same], s[:-1][same], s[1:][same])
+    origins = solution._segments.origins()
+
+    def since_start(segments: np.ndarray, local: np.ndarray) -> np.ndarray:
+        at = origins[segments]
+        return np.asarray((at[:, 0] - solution.t_start) + (at[:, 1] + local))
+
+    sample = Sampler(solution, chosen)
+    return orbit_from(sample, index[:-1][same], s[:-1][same], s[1:][same], since_start)
+
+
+def orbit_from(
+    sample: Sample,
+    segments: np.ndarray,
+    begins: np.ndarray,
+    ends: np.ndarray,
+    since_start: Callable[[np.ndarray, np.ndarray], np.ndarray],
+) -> Orbit:
+    """Return sampled quantities as an `Orbit`.
+
+    Parameters
+    ----------
+    segments, begins, ends : (K,) intervals in local times of segments, on which the quantities are smooth.
+    since_start : returns the time from the start of the run of local times in given segments.
+    """
+    steps = _Intervals(segments, begins, ends)
     rounding = _ROUNDINGS * _rounding(sample, steps)
     is_too_fast = np.zeros(len(sample.names), dtype=np.bool_)
     while True:  # repeat without the quantities that need too many intervals
@@ -162,15 +194,14 @@ def orbit_of(solution: Solution, chosen: Sequence[str] | None = None) -> Orbit:
         values[position], is_smooth[position] = part.values, part.is_smooth
     values[:, :, is_too_fast] = np.nan
     intervals = intervals.of(order)
-    origins = solution._segments.origins()[intervals.segments]
-    starts = (origins[:, 0] - solution.t_start) + (origins[:, 1] + intervals.begins)
+    starts = since_start(intervals.segments, intervals.begins)
     too_fast = frozenset(name for name, is_it in zip(sample.names, is_too_fast, strict=True) if is_it)
     lengths = intervals.ends - intervals.begins
     return Orbit(sample.names, starts, lengths, intervals.segments, values, is_smooth, too_fast)
 
 
 def _resolved(
-    sample: Sampler, intervals: _Intervals, rounding: np.ndarray, required: np.ndarray
+    sample: Sample, intervals: _Intervals, rounding: np.ndarray, required: np.ndarray
 ) -> tuple[list[_Finished], np.ndarray]:
     """Return intervals that resolve the required quantities (Q,), or a mask of the unresolved quantities."""
     count = len(sample.names)
@@ -204,7 +235,7 @@ def _resolved(
     return finished, np.zeros(count, dtype=np.bool_)
 
 
-def _sampled(sample: Sampler, intervals: _Intervals) -> tuple[np.ndarray, np.ndarray]:
+def _sampled(sample: Sample, intervals: _Intervals) -> tuple[np.ndarray, np.ndarray]:
     """Return the values (K, POINTS, Q) on intervals, and the largest error of each polynomial."""
     count = len(intervals.begins)
     values, misfits = np.empty((count, POINTS, len(sample.names))), np.empty((count, len(sample.names)))
@@ -220,7 +251,7 @@ def _sampled(sample: Sampler, intervals: _Intervals) -> tuple[np.ndarray, np.nda
     return values, misfits
 
 
-def _rounding(sample: Sampler, steps: _Intervals) -> np.ndarray:
+def _rounding(sample: Sample, steps: _Intervals) -> np.ndarray:
     """Return the polynomial error (Q,) that rounding causes, measured on very short intervals.
 
     For a difference of large terms, such as an energy balance, the misfit may consist of rounding on every

@@ -124,8 +124,17 @@ class Measures:
         """Names of the quantities that vary too fast, or jump too often, to be measured."""
         return tuple(name for name in self._names if name in self._orbit.too_fast)
 
+    def _orbit_with(self, name: str) -> Orbit:
+        """Return an orbit that contains a quantity."""
+        return self._orbit
+
     def _extreme(self, name: str, side: int) -> float:
-        return float(self._orbit.extremes[side][self._orbit.column(name)])
+        orbit = self._orbit_with(name)
+        return float(orbit.extremes[side][orbit.column(name)])
+
+    def _integral(self, name: str, power: int) -> float:
+        orbit = self._orbit_with(name)
+        return orbit.integral(orbit.of(name) ** power)
 
     @property
     def minimum(self) -> ByName:
@@ -150,12 +159,12 @@ class Measures:
     @property
     def mean(self) -> ByName:
         """Mean of each quantity over the period."""
-        return self._each("mean", lambda q: self._orbit.integral(self._orbit.of(q)) / self._orbit.duration)
+        return self._each("mean", lambda q: self._integral(q, 1) / self._orbit_with(q).duration)
 
     @property
     def energy(self) -> ByName:
         """Integral of q^2 over the period (He et al. 2026, eq. 5)."""
-        return self._each("energy", lambda q: self._orbit.integral(self._orbit.of(q) ** 2))
+        return self._each("energy", lambda q: self._integral(q, 2))
 
     @property
     def rms(self) -> ByName:
@@ -172,8 +181,9 @@ class Measures:
             raise cannot_be(
                 "k", k, "use 0 for the mean, 1 for the fundamental, or 2, 3, ... for higher harmonics"
             )
-        frequency = 2.0 * math.pi * k / self._orbit.duration
-        found = self._orbit.harmonic(name, frequency)
+        orbit = self._orbit_with(name)
+        frequency = 2.0 * math.pi * k / orbit.duration
+        found = orbit.harmonic(name, frequency)
         return found * cmath.exp(-1j * frequency * self._phase) if self._phase else found
 
     @property

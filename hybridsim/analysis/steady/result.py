@@ -91,6 +91,10 @@ class SteadyState(Readable, Measures):
         return self._motion.model
 
     @property
+    def _parameters(self) -> dict[str, float]:
+        return self.model.parameter_values()
+
+    @property
     def success(self) -> bool:
         """Whether the steady motion is periodic or an equilibrium."""
         return self.kind in ("periodic", "equilibrium")
@@ -201,7 +205,7 @@ class SteadyState(Readable, Measures):
         harmonics = whole_number(harmonics, "harmonics", 0, _MOST_LISTED)
         record: dict[str, Any] = {
             "model": self.model.name,
-            "parameters": self.model.parameter_values(),
+            "parameters": self._parameters,
             **fields_of(self, "kind", "message", "period", "multiple"),
             **fields_of(self, "residual", "newton_steps", "periods", "lyapunov"),
         }

@@ -40,6 +40,7 @@ from hybridsim.analysis.steady.together import (
     message_of,
     settled,
 )
+from hybridsim.analysis.structures.steady_state import steady_state_of_structure
 from hybridsim.analysis.variations.sensitivities import derivatives
 from hybridsim.analysis.variations.sizes import ranges
 from hybridsim.arguments import cannot_be
@@ -49,6 +50,7 @@ from hybridsim.engine.system.system import System
 from hybridsim.engine.system.system_cache import system_of
 from hybridsim.errors import UsageError
 from hybridsim.expr import evaluate
+from hybridsim.mechanics.declaration.system import MechanicalSystem
 from hybridsim.model import Model
 from hybridsim.simulate import simulate
 
@@ -73,7 +75,7 @@ QUASI, CHAOTIC, UNSETTLED = "quasi-periodic", "chaotic", "not settled"
 
 @refusing
 def steady_state(
-    model: Model | str | PathLike[str],
+    model: Model | MechanicalSystem | str | PathLike[str],
     *,
     params: Mapping[str, Any] | None = None,
     x0: Mapping[str, float] | Sequence[float] | None = None,
@@ -98,10 +100,13 @@ def steady_state(
 
     Parameters
     ----------
-    model : str, path or Model
-        As in `simulate`.
+    model : str, path, Model or MechanicalSystem
+        As in `simulate`. A `MechanicalSystem` needs a harmonic force or base, and a start in ``x0`` only. Its
+        states are followed from period to period, and extrapolated to their limit while the events stay the
+        same.
     params, x0, z0 : mapping, optional
-        As in `simulate`.
+        As in `simulate`. For a `MechanicalSystem` ``params`` sets ``omega`` and ``CONTACT.normal``, for example;
+        `sweep` lists the names.
     period : float, optional
         Period of the forcing; by default that of the model. Without forcing the period is unknown and is
         found with the motion.
@@ -141,10 +146,21 @@ def steady_state(
     >>> steady.kind, sorted(steady.word), steady.stops_per_period["f"]
     ('periodic', ['slip+', 'slip-', 'stick', 'stick'], 2.0)
     """
-    model = arguments.chosen_model(model, params)
+    if not isinstance(model, MechanicalSystem):
+        model = arguments.chosen_model(model, params)
     tol = arguments.number(tol, "tol")
     if not 0.0 < tol < 1.0:
         raise cannot_be("tol", tol, "use a relative tolerance between 0 and 1, such as 1e-10")
+    for name, count in (("settle", settle), ("max_periods", max_periods)):
+        arguments.whole_number(count, name, 1, _MAX_PERIODS_EVER)
+    report = arguments.callback(progress)
+    used = max(_TIGHTER * tol, 10.0 * arguments.SMALLEST_RTOL) if rtol is None else rtol
+    if isinstance(model, MechanicalSystem):
+        return steady_state_of_structure(
+            model, params=params, x0=x0, z0=z0, period=period, integrator=integrator,
+            rtol=arguments.relative_tolerance(used), tol=tol, settle=settle, max_periods=max_periods,
+            progress=report, **options,
+        )  # fmt: skip
     system = system_of(model)
     _refuse_what_ends(system, period is not None)
     chosen = {"x0": x0, "z0": z0, "period": period, "integrator": integrator, **options}
@@ -153,15 +169,9 @@ def steady_state(
         period = own
     else:
         _check_period(model, arguments.number(period, "period"), own)
-    method = {
-        "integrator": integrator,
-        "rtol": max(_TIGHTER * tol, 10.0 * arguments.SMALLEST_RTOL) if rtol is None else rtol,
-    }
-    report = arguments.callback(progress)
+    method = {"integrator": integrator, "rtol": used}
     refuse_unknown([steady_state, simulate], {**method, **options})
     motion = Motion(model, {**method, **options}, {"x0": x0, "z0": z0})
-    for name, count in (("settle", settle), ("max_periods", max_periods)):
-        arguments.whole_number(count, name, 1, _MAX_PERIODS_EVER)
     if own is not None and can_be_compiled(system, chosen):
         together = settled(motion, Effort(tol, settle, max_periods))
         if together is not None:

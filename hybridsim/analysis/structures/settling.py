@@ -21,7 +21,9 @@ from hybridsim.analysis.structures.period_map import PeriodMap
 _FLOOR = 1e-3  # smallest scale of a position or a velocity, relative to the largest scale of its kind
 _EVERY = 4  # periods between tests
 _COUNTS = (4, 8, 16, 32, 64, 128)  # periods in an extrapolation
-_BEYOND = 0.9  # the same if the change falls with the square of the distance, as of a contact that hardly slips
+_BEYOND = (
+    0.9  # the same if the change falls with the square of the distance, as of a contact that hardly slips
+)
 _FEWEST = 3  # periods for an extrapolation
 _GAIN = 0.1  # expected ratio of changes that makes an extrapolation worthwhile
 _CLOSER = 0.5  # an extrapolation that does not reduce the change by this factor is taken back
@@ -58,7 +60,9 @@ class Settling:
         self._beyond = 0.0  # length of the next extrapolation beyond the limit
         self._slowest = np.zeros(0)  # change over a period before the last extrapolation
         self._states = [period_map.x]  # at consecutive periods since the last extrapolation
-        self._pairs: list[tuple[np.ndarray, np.ndarray]] = []  # states before and after periods with equal events
+        self._pairs: list[
+            tuple[np.ndarray, np.ndarray]
+        ] = []  # states before and after periods with equal events
         self._events = b""  # changes of mode over these periods
 
     def run(self, progress: Callable[[float], None] | None) -> Settled:

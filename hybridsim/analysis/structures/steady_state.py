@@ -1,0 +1,119 @@
+"""This module finds the steady motion of a forced mechanical system for `hybridsim.steady_state`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from hybridsim import arguments
+from hybridsim.analysis.steady.quiet import middle_of_longest
+from hybridsim.analysis.structures.period_map import PeriodMap, forcing_period_of
+from hybridsim.analysis.structures.result import StructureSteadyState
+from hybridsim.analysis.structures.settling import Settled, Settling
+from hybridsim.engine.native.compiler import announce_compilation
+from hybridsim.errors import UsageError, nearest
+from hybridsim.mechanics.declaration.named_values import with_values
+from hybridsim.mechanics.declaration.system import MechanicalSystem
+from hybridsim.mechanics.simulate import start_of
+
+_COMMENSURATE = 1e-9
+_NEAR = 1e-6  # of a period: an event this close to its end may be counted twice
+
+
+def steady_state_of_structure(
+    system: MechanicalSystem,
+    *,
+    params: Mapping[str, Any] | None,
+    x0: Mapping[str, float] | Sequence[float] | None,
+    period: float | None,
+    integrator: str,
+    rtol: float,
+    tol: float,
+    settle: int,
+    max_periods: int,
+    progress: Callable[[float], None] | None,
+    **refused: Any,
+) -> StructureSteadyState:
+    """Find the steady motion of a system; `hybridsim.steady_state` describes the arguments and checks most.
+
+    Raises
+    ------
+    UsageError
+        For arguments that a mechanical system does not support, or a system without a period.
+    """
+    _refuse(system, integrator, refused)
+    if params is not None:
+        if not isinstance(params, Mapping):
+            raise arguments.cannot_be("params", params, "use a dict of names and values")
+        system = with_values(system, {n: arguments.finite_number(v, str(n)) for n, v in params.items()})
+    base = _period(system, period)
+    start = start_of(system, x0)
+    announce_compilation()
+    period_map = PeriodMap(system, base, start, rtol)
+    settled = Settling(period_map, tol, settle, max_periods).run(progress)
+    return _result(period_map, settled, max_periods)
+
+
+def _result(period_map: PeriodMap, settled: Settled, max_periods: int) -> StructureSteadyState:
+    passings, multiple, followed = settled.passings, settled.multiple or 1, period_map.periods
+    residual = passings.residual(multiple)
+    if settled.rests:
+        kind, message = "equilibrium", "equilibrium: nothing moves"
+    elif settled.multiple is not None:
+        kind = "periodic"
+        of = f" of {multiple} periods of the forcing" if multiple > 1 else ""
+        message = f"periodic motion{of}; residual {residual:.1e}"
+    else:
+        kind = "not settled"
+        message = (
+            f"not settled after {followed} periods: over the last one the states change by {residual:.1e}"
+        )
+        drifting = passings.drifting()
+        if drifting is not None:
+            message += f", and {period_map.state_names[drifting]} drifts"
+    run = period_map.recorded(multiple, 0.0)
+    times = np.append(np.unique(run.changes[0]), [])
+    length = multiple * period_map.period
+    inside = (times > _NEAR * length) & (times < (1.0 - _NEAR) * length)
+    if len(times) and not inside.all():
+        run = period_map.recorded(multiple, middle_of_longest(np.sort(times % length), length))
+    return StructureSteadyState(run, kind, multiple, residual, followed, message)
+
+
+def _period(system: MechanicalSystem, period: float | None) -> float:
+    own = forcing_period_of(system)
+    if period is None:
+        return own
+    base = arguments.number(period, "period")
+    if not (base > 0.0 and math.isfinite(base)):
+        raise arguments.cannot_be("period", period, "use a time above zero")
+    if abs(base / own - max(round(base / own), 1)) > _COMMENSURATE * base / own:
+        raise UsageError(
+            f"`period` is {base!r}, but {system.name} is forced with the period {own!r}",
+            remedy="remove `period`, or use a whole multiple of the forcing period",
+        )
+    return base
+
+
+def _refuse(system: MechanicalSystem, integrator: str, options: Mapping[str, Any]) -> None:
+    if system.impacts:
+        raise UsageError(
+            f"{system.name} has impacts, for which steady states are not supported",
+            remedy="use hs.simulate with integrator='moreau' until the motion repeats",
+        )
+    name = arguments.integrator_name(integrator)
+    if name not in ("auto", "taylor"):
+        raise UsageError(
+            f"`integrator` is {name!r}, but steady states of a MechanicalSystem are found with taylor",
+            remedy="remove `integrator`, or use hs.steady_state(system.to_model(), ...)",
+        )
+    for option, value in options.items():
+        if value is not None:
+            known = ("params", "x0", "period", "rtol", "tol", "settle", "max_periods", "progress")
+            raise UsageError(
+                f"steady_state() does not support `{option}` for a MechanicalSystem",
+                remedy=nearest(option, known, kind="arguments"),
+            )
