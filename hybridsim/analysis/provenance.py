@@ -9,17 +9,20 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 from hybridsim import __version__
+from hybridsim.analysis.structures.swept import model_to_sweep
+from hybridsim.mechanics.declaration.system import MechanicalSystem
 from hybridsim.model import Model
 
 _PACKAGES = ("numpy", "scipy", "numba", "scikit-sundae", "sympy", "mpmath")
 
 
-def provenance(model: Model) -> dict[str, Any]:
+def provenance(model: Model | MechanicalSystem) -> dict[str, Any]:
     """Return versions, machine, model, parameters and initial values of a result as plain values for JSON.
 
     The hash covers the model as text with the parameters and initial values of this run. It is None for a
-    model of Python functions, which has no text.
+    model of Python functions or a `MechanicalSystem`, which have no text.
     """
+    model = model_to_sweep(model, None)
     return {
         "hybridsim": __version__,
         "python": f"{platform.python_implementation()} {platform.python_version()}",

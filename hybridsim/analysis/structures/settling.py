@@ -138,7 +138,7 @@ class Settling:
         self._beyond = _BEYOND if left > _GAIN else 0.0
 
     def _attracts(self, passings: Passings) -> bool:
-        """Return whether a small change in the slowest direction does not grow; if not, go on from the changed states."""
+        """Return whether a change in the slowest direction does not grow; if it does, go on from the changed states."""
         if not (self.extrapolations and self._may_extrapolate):
             return True
         start, scale = self.map.snapshot(), passings.scale

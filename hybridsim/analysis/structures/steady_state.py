@@ -13,9 +13,9 @@ from hybridsim.analysis.steady.quiet import middle_of_longest
 from hybridsim.analysis.structures.period_map import PeriodMap, forcing_period_of
 from hybridsim.analysis.structures.result import StructureSteadyState
 from hybridsim.analysis.structures.settling import Settled, Settling
+from hybridsim.analysis.structures.swept import model_to_sweep
 from hybridsim.engine.native.compiler import announce_compilation
 from hybridsim.errors import UsageError, nearest
-from hybridsim.mechanics.declaration.named_values import with_values
 from hybridsim.mechanics.declaration.system import MechanicalSystem
 from hybridsim.mechanics.simulate import start_of
 
@@ -46,9 +46,7 @@ def steady_state_of_structure(
     """
     _refuse(system, integrator, refused)
     if params is not None:
-        if not isinstance(params, Mapping):
-            raise arguments.cannot_be("params", params, "use a dict of names and values")
-        system = with_values(system, {n: arguments.finite_number(v, str(n)) for n, v in params.items()})
+        system = model_to_sweep(system, params).system
     base = _period(system, period)
     start = start_of(system, x0)
     announce_compilation()

@@ -7,17 +7,19 @@ from os import PathLike
 from typing import Any
 
 from hybridsim.analysis.compare.comparison_request import mapping
+from hybridsim.analysis.structures.swept import model_to_sweep
 from hybridsim.analysis.sweep.result import Sweep
 from hybridsim.analysis.sweep.sweep import sweep
-from hybridsim.arguments import cannot_be, chosen_model, text
+from hybridsim.arguments import cannot_be, text
 from hybridsim.calls import refusing
 from hybridsim.errors import UsageError
+from hybridsim.mechanics.declaration.system import MechanicalSystem
 from hybridsim.model import Model
 
 
 @refusing
 def frequency_response(
-    model: Model | str | PathLike[str],
+    model: Model | MechanicalSystem | str | PathLike[str],
     frequencies: Sequence[Any],
     levels: Mapping[str, Sequence[Any]] | None = None,
     *,
@@ -30,8 +32,8 @@ def frequency_response(
 
     Parameters
     ----------
-    model : str, path or Model
-        As in `simulate`.
+    model : str, path, Model or MechanicalSystem
+        As in `sweep`.
     frequencies : sequence of str or float
         Values of the parameter ``frequency``, numbers or expressions.
     levels : mapping of str to sequence, optional
@@ -57,7 +59,7 @@ def frequency_response(
     >>> found.dimensions, list(found.values)
     (('N', 'omega'), ['amplitude.x', 'stick_fraction.f', 'stops_per_period.f'])
     """
-    model = chosen_model(model, params)
+    model = model_to_sweep(model, params)
     others, frequency = mapping(levels, "levels"), text(frequency, "frequency")
     if len(others) > 1 or frequency in others:
         raise cannot_be("levels", levels, "use one parameter other than the frequency")

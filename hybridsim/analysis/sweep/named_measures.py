@@ -21,6 +21,8 @@ from hybridsim.analysis.steady.together import (
     effort_of,
     steady_motions,
 )
+from hybridsim.analysis.structures.result import StructureSteadyState
+from hybridsim.analysis.structures.swept import SweptSystem
 from hybridsim.analysis.sweep.last_period import OF_MOTION, LastPeriod, MeasuredPeriod, period_of
 from hybridsim.analysis.sweep.run_readings import (
     FINAL,
@@ -89,6 +91,8 @@ class Steady:
 
         The function `alone` measures the points that compiled code cannot decide.
         """
+        if isinstance(job.model, SweptSystem):
+            return None
         system, checked = system_of(job.model), effort_of(self.options)
         readers = {word: _steady_reader(word, system) for word in self.reading_names}
         if checked is None or None in readers.values() or not can_be_compiled(system, self.options):
@@ -158,6 +162,11 @@ def named_measure(
 
 
 def _last_period(reading_names: tuple[str, ...], model: Model, options: dict[str, Any]) -> LastPeriod:
+    if isinstance(model, SweptSystem):
+        raise UsageError(
+            "`after` is not supported for a MechanicalSystem",
+            remedy="remove `after`: the readings are then those of the steady state",
+        )
     after = whole(options.pop(AFTER), AFTER)
     for name in ("t_span", "keep", "save", "t_eval"):
         if name in options:
@@ -168,6 +177,8 @@ def _last_period(reading_names: tuple[str, ...], model: Model, options: dict[str
 
 def units_of_readings(reading_names: Iterable[str], model: Model) -> dict[str, str]:
     """Return the units of named values that are declared in the model."""
+    if isinstance(model, SweptSystem):
+        return {}
     known, time = units_of(model), time_unit(model)
     units = {}
     for word in reading_names:
@@ -184,7 +195,8 @@ def units_of_readings(reading_names: Iterable[str], model: Model) -> dict[str, s
 def _known(model: Model, of_motion: Sequence[str]) -> list[str]:
     """Return the names of all values of a steady state, with the first harmonic of each quantity."""
     discrete = {d.name for d in model.discrete}
-    quantities = [name for name in units_of(model) if name not in discrete]
+    names = model.quantities if isinstance(model, SweptSystem) else units_of(model)
+    quantities = [name for name in names if name not in discrete]
     contacts = [contact.name for contact in model.contacts]
     numbered = {"harmonic": ".1"}
     found = [f"{head}.{name}{numbered.get(head, '')}" for head in _OF_QUANTITY for name in quantities]
@@ -218,6 +230,8 @@ def _reading(steady: SteadyState | MeasuredPeriod, word: str) -> Any:
 
 def _start_of(steady: SteadyState) -> dict[str, Any]:
     """Return the states and the modes at which a steady motion starts."""
+    if isinstance(steady, StructureSteadyState):
+        return {"x0": steady.start}
     run = steady.solution
     x0 = dict(zip(run.names, run.y[:, 0].tolist(), strict=True))
     x0 |= {d.name: float(run.output(d.name, run.t_start)) for d in run.model.discrete}

@@ -14,6 +14,7 @@ from hybridsim import __version__
 from hybridsim.analysis.compare.comparison_request import mapping, whole
 from hybridsim.analysis.keyword_options import refuse_what_it_does_not_take
 from hybridsim.analysis.progress import Progress
+from hybridsim.analysis.structures.swept import declared, model_to_sweep
 from hybridsim.analysis.sweep.axes import points_of
 from hybridsim.analysis.sweep.journal import Journal, fingerprint
 from hybridsim.analysis.sweep.last_period import LastPeriod
@@ -22,9 +23,10 @@ from hybridsim.analysis.sweep.result import Sweep
 from hybridsim.analysis.sweep.run_readings import OfRun
 from hybridsim.analysis.sweep.work.job import Job, Measure, new_token
 from hybridsim.analysis.sweep.work.measure import work
-from hybridsim.arguments import callback, cannot_be, chosen_model, flag, is_row
+from hybridsim.arguments import callback, cannot_be, flag, is_row
 from hybridsim.calls import refusing
 from hybridsim.errors import UsageError
+from hybridsim.mechanics.declaration.system import MechanicalSystem
 from hybridsim.model import Model
 
 
@@ -62,7 +64,7 @@ def measure_of(measure: Any, model: Model, chained: bool, options: Mapping[str, 
 
 @refusing
 def sweep(
-    model: Model | str | PathLike[str],
+    model: Model | MechanicalSystem | str | PathLike[str],
     values: Mapping[str, Sequence[Any]],
     measure: str | Sequence[str] | Callable[..., Any],
     *,
@@ -84,8 +86,11 @@ def sweep(
 
     Parameters
     ----------
-    model : str, path or Model
-        A `Model`, the name of a packaged one, or the path of a ``.toml`` file.
+    model : str, path, Model or MechanicalSystem
+        A `Model`, the name of a packaged one, or the path of a ``.toml`` file. The parameters of a
+        `MechanicalSystem` are ``omega``, the lowest frequency of its forces and bases (the others keep their
+        ratio to it), and ``CONTACT.normal``, ``CONTACT.base`` and ``CONTACT.mu`` for each contact and parameter
+        of its law. Without a contact, ``normal`` sets all contacts if they have the same value.
     values : mapping of str to sequence
         For each parameter, or state (its initial value), a row of numbers or expressions: ``{"F0": [20, 30],
         "omega": ["0.5*sqrt(k/m)", 400]}``.
@@ -149,7 +154,7 @@ def sweep(
     >>> found["value"].tolist()[:2], bool(found.failed.any())
     ([0.0, 0.0], False)
     """
-    model = chosen_model(model, params).validate()
+    model = model_to_sweep(model, params).validate()
     points = points_of(model, values, mode)
     tell, warm_start, names_of_units = (
         callback(progress),
@@ -191,7 +196,7 @@ def sweep(
     if not callable(measure):
         known |= units_of_readings(found, model)
     return Sweep(
-        model,
+        declared(model),
         points.mode,
         {axis.name: axis.values for axis in points.axes},
         found,
