@@ -26,6 +26,7 @@ _BEYOND = (
 )
 _FEWEST = 3  # periods for an extrapolation
 _GAIN = 0.1  # expected ratio of changes that makes an extrapolation worthwhile
+_FARTHEST = 1e3  # of the scale: a limit further away is that of a state that drifts
 _CLOSER = 0.5  # an extrapolation that does not reduce the change by this factor is taken back
 _CHANGE = 1e-6  # of the scale: the change of the states that must not grow
 _DECAY, _GROWN = 8, 1.1  # periods of this test, and the growth that is allowed, as of a neutral direction
@@ -121,7 +122,7 @@ class Settling:
             limit, expected = limit_of(before[-count:], after[-count:], scale)
             if expected < _GAIN * change or count >= len(before):
                 break
-        if not expected < _GAIN * change:
+        if not (expected < _GAIN * change and relative(limit - after[-1], scale) < _FARTHEST):
             return
         former, events, states = self.map.snapshot(), self._events, self._states
         limit += self._beyond * (limit - after[-1])

@@ -1,0 +1,219 @@
+"""Steady states of mechanical systems: against closed forms, the ordinary model and a time stepper."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from numba import njit
+from scipy import sparse
+
+import hybridsim as hs
+from hybridsim.analysis.structures.settling import Settling
+from hybridsim.errors import UsageError
+
+_FORCE, _PHASE, _DAMPING = 2.0, 0.3, 0.1
+
+
+def limits(n: int) -> np.ndarray:
+    """The friction limit of each block."""
+    return 0.4 * (1.0 + 0.3 * np.sin(np.arange(n)))
+
+
+def chain(n: int, omega: float) -> hs.MechanicalSystem:
+    """A chain of n blocks on the ground, each forced and with friction."""
+    beside = np.full(n - 1, -1.0)
+    contacts = [
+        hs.MechanicalContact(f"f{i + 1}", {i: 1.0}, 1.0, "coulomb", {"mu": mu})
+        for i, mu in enumerate(limits(n).tolist())
+    ]
+    return hs.MechanicalSystem(
+        np.ones(n),
+        np.full(n, _DAMPING),
+        sparse.diags_array([np.full(n, 3.0), beside, beside], offsets=[0, 1, -1]),
+        {i: hs.Harmonic(omega, sin=_FORCE * math.cos(_PHASE * i)) for i in range(n)},
+        contacts,
+    )
+
+
+@njit
+def stepped(n: int, omega: float, limit: Any, steps: int, periods: int) -> Any:
+    """Half the range of each block over the last period, by leapfrog steps with the friction of each step."""
+    q, v = np.zeros(n), np.zeros(n)
+    low, high = np.full(n, np.inf), np.full(n, -np.inf)
+    h = 2.0 * math.pi / omega / steps
+    for k in range(steps * periods):
+        drive = math.sin(omega * h * (k % steps))
+        for i in range(n):
+            left = q[i - 1] if i > 0 else 0.0
+            right = q[i + 1] if i < n - 1 else 0.0
+            force = _FORCE * math.cos(_PHASE * i) * drive - 3.0 * q[i] + left + right
+            free = (v[i] * (1.0 - 0.5 * h * _DAMPING) + h * force) / (1.0 + 0.5 * h * _DAMPING)
+            slowed = max(abs(free) - h * limit[i] / (1.0 + 0.5 * h * _DAMPING), 0.0)
+            v[i] = slowed if free > 0.0 else -slowed
+        for i in range(n):
+            q[i] += h * v[i]
+            if k >= steps * (periods - 1):
+                low[i], high[i] = min(low[i], q[i]), max(high[i], q[i])
+    return 0.5 * (high - low)
+
+
+@pytest.mark.parametrize("omega", [0.6, 1.0, 1.5, 2.0, 2.6])
+def test_a_chain_of_fifty_agrees_with_a_time_stepper(omega: float) -> None:
+    """The amplitudes are those that refined steps from rest end with."""
+    steady = hs.steady_state(chain(50, omega))
+    assert steady.kind == "periodic"
+    found = np.array([steady.amplitude[f"q{i + 1}"] for i in range(50)])
+    expected = stepped(50, omega, limits(50), 32000, 150)
+    assert np.abs(found - expected).max() <= 1e-4 * expected.max()
+
+
+def test_three_blocks_agree_with_the_ordinary_model() -> None:
+    """All readings are those of `to_model`, whose events and orbits are found by other code."""
+    system = chain(3, 1.2).with_(forcing=[hs.Harmonic(1.2, sin=1.0), (0.1, hs.Harmonic(2.4, cos=0.3)), 0.0])
+    one, other = hs.steady_state(system), hs.steady_state(system.to_model())
+    assert one.period == pytest.approx(other.period, rel=1e-12)
+    for name in ("q1", "q2", "q3", "v1", "v3"):
+        assert one.amplitude[name] == pytest.approx(other.amplitude[name], rel=1e-9)
+        assert one.peak[name] == pytest.approx(other.peak[name], rel=1e-9)
+        assert one.energy[name] == pytest.approx(other.energy[name], rel=1e-9)
+        assert one.mean[name] == pytest.approx(other.mean[name], rel=1e-9, abs=1e-9)
+        assert abs(one.harmonic(name, 3) - other.harmonic(name, 3)) <= 1e-9
+    sticks = 0.0
+    for contact in ("f1", "f2", "f3"):
+        assert one.stick_fraction[contact] == pytest.approx(other.stick_fraction[contact], abs=1e-8)
+        assert one.dissipated[contact] == pytest.approx(other.dissipated[contact], rel=1e-8, abs=1e-12)
+        assert one.stops_per_period[contact] == other.stops_per_period[contact]
+        assert one.solution.dissipated[contact] == pytest.approx(one.dissipated[contact], rel=1e-8, abs=1e-12)
+        sticks += one.stick_fraction[contact]
+    assert 0.0 < sticks < 3.0
+
+
+def test_the_response_of_one_block_is_that_of_den_hartog() -> None:
+    """Without stops, the amplitude has the closed form of J. P. Den Hartog, Trans. ASME 53 (1931) 107."""
+    for r in (0.7, 0.8, 1.3):
+        mu = 0.2
+        contact = hs.MechanicalContact("f", [1.0], 1.0, "coulomb", {"mu": mu})
+        system = hs.MechanicalSystem([1.0], None, [1.0], [hs.Harmonic(r, sin=1.0)], [contact])
+        steady = hs.steady_state(system)
+        v = 1.0 / (1.0 - r * r)
+        u = math.sin(math.pi / r) / (r * (1.0 + math.cos(math.pi / r)))
+        assert steady.stops_per_period["f"] == 0.0
+        assert steady.amplitude["q1"] == pytest.approx(math.sqrt(v * v - (mu * u) ** 2), rel=1e-9)
+
+
+def test_a_structure_without_contacts_has_the_linear_response() -> None:
+    """The amplitude is that of the complex stiffness; the period is common to both forces."""
+    M, C, K = np.diag([1.0, 2.0]), np.array([[0.2, -0.1], [-0.1, 0.3]]), np.array([[3.0, -1.0], [-1.0, 2.0]])
+    forces = [hs.Harmonic(1.0, sin=1.0), hs.Harmonic(1.5, cos=0.5)]
+    steady = hs.steady_state(hs.MechanicalSystem(M, C, K, forces))
+    assert steady.period == pytest.approx(4.0 * math.pi, rel=1e-15)
+    for k, w, force in ((2, 1.0, [1.0, 0.0]), (3, 1.5, [0.0, 0.5])):
+        expected = np.abs(np.linalg.solve(K - w * w * M + 1j * w * C, force))
+        for i in range(2):
+            assert abs(steady.harmonic(f"q{i + 1}", k)) == pytest.approx(expected[i], rel=1e-9)
+
+
+def test_a_force_below_the_friction_limit_moves_nothing() -> None:
+    """The motion is an equilibrium, and the contact sticks all the time."""
+    contact = hs.MechanicalContact("f", [1.0], 1.0, "coulomb", {"mu": 0.5})
+    system = hs.MechanicalSystem([1.0], None, [1.0], [hs.Harmonic(1.0, sin=0.4)], [contact])
+    steady = hs.steady_state(system)
+    assert (steady.kind, steady.stick_fraction["f"], steady.amplitude["q1"]) == ("equilibrium", 1.0, 0.0)
+
+
+def test_a_frequency_response_is_the_steady_states_over_omega() -> None:
+    """Frequency, load and base are set by name; other frequencies keep their ratio to the lowest one."""
+    system = chain(2, 1.0).with_(forcing=[hs.Harmonic(1.0, sin=2.0), hs.Harmonic(2.0, sin=1.0)])
+    found = hs.frequency_response(system, [0.8, 1.7], {"normal": [1.0, 1.5]}, quantity="q2")
+    assert found.dimensions == ("normal", "omega") and not found.failed.any()
+    for i, load in enumerate((1.0, 1.5)):
+        for j, omega in enumerate((0.8, 1.7)):
+            own = system.with_(
+                forcing=[hs.Harmonic(omega, sin=2.0), hs.Harmonic(2.0 * omega, sin=1.0)],
+                contacts=[
+                    hs.MechanicalContact(f"f{k + 1}", {k: 1.0}, load, "coulomb", {"mu": mu})
+                    for k, mu in enumerate(limits(2).tolist())
+                ],
+            )
+            alone = hs.steady_state(own)
+            assert found["amplitude.q2"][i, j] == pytest.approx(alone.amplitude["q2"], rel=1e-9)
+            assert found["stick_fraction.f1"][i, j] == pytest.approx(alone.stick_fraction["f1"], abs=1e-9)
+
+
+def test_a_sweep_reads_coordinates_contacts_and_starts() -> None:
+    """Warm starts and named readings work as for a model, and a failed point names its reason."""
+    system = chain(2, 1.3)
+    names = ["amplitude.q1", "dissipated.f2", "peak.v_rel(f1)", "kind"]
+    one = hs.sweep(system, {"f1.mu": [0.3, 0.4]}, names, warm_start=True)
+    other = hs.sweep(system, {"f1.mu": [0.3, 0.4], "q1": [0.5, 0.5]}, names, mode="list")
+    for name in names[:-1]:
+        assert one[name] == pytest.approx(other[name], rel=1e-8)
+    assert one.to_dict()["provenance"]["parameters"]["f2.mu"] == limits(2)[1]
+    failed = hs.sweep(system, {"f1.normal": [-1.0, 1.0]}, "amplitude.q1")
+    assert "f1" in failed.status[0] and failed.status[1] == "ok"
+
+
+@pytest.mark.parametrize(
+    ("system", "options", "part"),
+    [
+        (chain(2, 1.0).with_(forcing=None), {}, "no harmonic force"),
+        (chain(2, 1.0).with_(forcing=[hs.Harmonic(1.0, 1.0), hs.Harmonic(math.sqrt(2), 1.0)]), {}, "common"),
+        (chain(2, 1.0), {"integrator": "moreau"}, "moreau"),
+        (chain(2, 1.0), {"z0": {"f1": "stick"}}, "z0"),
+        (chain(2, 1.0), {"period": 1.0}, "period"),
+        (chain(2, 1.0), {"params": {"f3.mu": 1.0}}, "f3.mu"),
+        (hs.chain_on_belt(2, gap=2.0), {}, "impacts"),
+    ],
+)
+def test_what_has_no_steady_state_is_refused(
+    system: hs.MechanicalSystem, options: dict[str, Any], part: str
+) -> None:
+    """The message names the argument or the cause."""
+    with pytest.raises(UsageError, match=part):
+        hs.steady_state(system, **options)
+
+
+def test_a_motion_that_drifts_is_not_settled() -> None:
+    """A block without a spring, under a force with a mean above friction, never returns."""
+    contact = hs.MechanicalContact("f", [1.0], 1.0, "coulomb", {"mu": 0.1})
+    system = hs.MechanicalSystem([1.0], [0.5], None, [(0.3, hs.Harmonic(1.0, sin=1.0))], [contact])
+    steady = hs.steady_state(system, max_periods=200)
+    assert steady.kind == "not settled" and "q1 drifts" in steady.message
+    with pytest.raises(UsageError, match="not settled"):
+        steady.amplitude["q1"]
+
+
+class _Logistic:
+    """A map x -> r x (1 - x) in the place of a `PeriodMap`, beside a decaying velocity."""
+
+    def __init__(self, r: float) -> None:
+        self.r, self.periods, self.period = r, 0, 1.0
+        self.x, self.modes, self.changes = np.array([0.3, 1.0]), np.zeros(0, dtype=np.int64), b"same"
+
+    def snapshot(self) -> tuple[np.ndarray, ...]:
+        return (self.x.copy(),)
+
+    def restore(self, snapshot: tuple[np.ndarray, ...]) -> None:
+        self.x = snapshot[0].copy()
+
+    def put(self, x: np.ndarray) -> None:
+        self.x = x.copy()
+
+    def advance(self) -> np.ndarray:
+        self.x = np.array([self.r * self.x[0] * (1.0 - self.x[0]), 0.9 * self.x[1]])
+        self.periods += 1
+        return self.x
+
+    def sizes(self) -> tuple[np.ndarray, np.ndarray]:
+        self.advance()
+        return np.array([0.5, 0.5]), np.array([1.0, 1.0])
+
+
+@pytest.mark.parametrize(("r", "multiple"), [(2.9, 1), (3.2, 2), (3.5, 4)])
+def test_extrapolation_does_not_end_on_a_motion_that_repels(r: float, multiple: int) -> None:
+    """The fixed point 1 - 1/r of the logistic map repels for r > 3, where a cycle of 2, then 4 periods attracts."""
+    settled = Settling(_Logistic(r), 1e-10, 8, 4096).run(None)  # type: ignore[arg-type]  # has the same methods
+    assert settled.multiple == multiple
