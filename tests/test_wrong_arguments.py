@@ -191,6 +191,11 @@ def mechanical() -> hs.MechanicalSystem:
     return hs.MechanicalSystem([1.0], None, [1.0], contacts=[contact], q0=[1.0])
 
 
+def forced() -> hs.MechanicalSystem:
+    """A mechanical system with a harmonic force."""
+    return mechanical().with_(C=[0.5], forcing=[hs.Harmonic(1.0, sin=1.0)])
+
+
 CALLS: dict[str, tuple[Callable[[], Callable[..., Any]], Callable[[], dict[str, Any]]]] = {
     "State": (lambda: hs.State, lambda: {"name": "x", "start": 1, "der": "-x"}),
     "Parameter": (lambda: hs.Parameter, lambda: {"name": "p", "value": 1.0}),
@@ -296,6 +301,15 @@ CALLS: dict[str, tuple[Callable[[], Callable[..., Any]], Callable[[], dict[str, 
     "frequency_response": (
         lambda: hs.frequency_response,
         lambda: {"model": tiny(), "frequencies": [1.0], "frequency": "w"},
+    ),
+    "steady_state of a structure": (lambda: hs.steady_state, lambda: {"model": forced()}),
+    "sweep of a structure": (
+        lambda: hs.sweep,
+        lambda: {"model": forced(), "values": {"omega": [1.0]}, "measure": "amplitude.q1"},
+    ),
+    "frequency_response of a structure": (
+        lambda: hs.frequency_response,
+        lambda: {"model": forced(), "frequencies": [1.0]},
     ),
     "bifurcation": (
         lambda: hs.bifurcation,

@@ -72,7 +72,7 @@ def loaded(name_or_path: str | os.PathLike[str]) -> Model:
     if not isinstance(argument, str | os.PathLike):
         remedy = "use a Model, a name or a path"
         if hasattr(argument, "to_model"):
-            remedy = "pass the system to hs.simulate directly, or convert it to a model by system.to_model()"
+            remedy = "pass the system to hs.simulate or hs.steady_state, or convert it to a model by system.to_model()"
         elif callable(argument):
             remedy = "for rates from a function f(t, x, p) use hs.Model('m', states={'x': 1.0}, flow=f)"
         raise UsageError(f"The model cannot be {argument!r}", remedy=remedy)

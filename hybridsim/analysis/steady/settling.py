@@ -72,7 +72,8 @@ class Passings:
         earlier = self._change(back, multiple)
         if not residual < earlier:
             return residual if residual <= rounding else float("inf")
-        return float(residual / (1.0 - (residual / earlier) ** (1.0 / back)))
+        rate = (residual / earlier) ** (1.0 / back)
+        return float(residual / (1.0 - rate)) if rate < 1.0 else float("inf")
 
     def more(self, multiple: int, tolerance: float) -> float:
         """Estimate how many more passages the motion needs to settle to the tolerance."""
