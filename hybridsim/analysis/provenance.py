@@ -22,7 +22,7 @@ def provenance(model: Model | MechanicalSystem) -> dict[str, Any]:
     The hash covers the model as text with the parameters and initial values of this run. It is None for a
     model of Python functions or a `MechanicalSystem`, which have no text.
     """
-    model = model_to_sweep(model, None)
+    read = model_to_sweep(model, None)
     return {
         "hybridsim": __version__,
         "python": f"{platform.python_implementation()} {platform.python_version()}",
@@ -30,10 +30,10 @@ def provenance(model: Model | MechanicalSystem) -> dict[str, Any]:
         "system": platform.system(),
         "processor": platform.machine(),
         "cpus": os.cpu_count(),
-        "model": model.name,
-        "parameters": dict(model.parameter_values()),
-        "start": dict(model.start_values()),
-        "model_sha256": None if model.flow else hashlib.sha256(model.to_toml().encode()).hexdigest(),
+        "model": read.name,
+        "parameters": dict(read.parameter_values()),
+        "start": dict(read.start_values()),
+        "model_sha256": None if read.flow else hashlib.sha256(read.to_toml().encode()).hexdigest(),
     }
 
 

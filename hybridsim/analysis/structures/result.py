@@ -77,7 +77,7 @@ class StructureSteadyState(SteadyState):
         return tuple(self._run.event_names)
 
     @cached_property
-    def _orbit(self) -> Orbit:  # type: ignore[override]  # as in the base class
+    def _orbit(self) -> Orbit:
         """The orbit of the contacts; each coordinate has an orbit of its own."""
         self._require_period()
         return orbit_of_contacts(self._run)
@@ -146,11 +146,11 @@ class StructureSteadyState(SteadyState):
         return tuple(found)
 
     @property
-    def grazing(self) -> None:  # type: ignore[override]  # never known
+    def grazing(self) -> None:
         """None, because the guards of a `MechanicalSystem` are not recorded."""
 
     @property
-    def multipliers(self) -> NoReturn:  # type: ignore[override]  # never known
+    def multipliers(self) -> NoReturn:
         """Refused, because a run of a `MechanicalSystem` carries no derivatives."""
         raise UsageError(
             f"{self.model.name} is a MechanicalSystem, whose steady states have no multipliers",

@@ -12,6 +12,7 @@ from hybridsim.expr import Expression, evaluate, parse, resolve
 from hybridsim.mechanics.declaration.named_values import values_of, with_values
 from hybridsim.mechanics.declaration.system import MechanicalContact, MechanicalSystem
 from hybridsim.model import Model
+from hybridsim.model.checks.units import units_of
 from hybridsim.solution.run_trajectory import relative_velocity
 
 
@@ -96,6 +97,16 @@ def model_to_sweep(model: Any, params: Any) -> Any:
     if not isinstance(params, Mapping) or not all(isinstance(name, str) for name in params):
         raise cannot_be("params", params, "use a dict of names and values, such as {'omega': 2.0}")
     return SweptSystem(model.with_(**params))
+
+
+def quantities_of(model: Any) -> list[str]:
+    """Return the names of the quantities of a model or a structure that can be measured."""
+    return list(model.quantities if isinstance(model, SweptSystem) else units_of(model))
+
+
+def is_structure(model: object) -> bool:
+    """Return whether a sweep's model is a `SweptSystem`."""
+    return isinstance(model, SweptSystem)
 
 
 def declared(model: Model | SweptSystem) -> Any:

@@ -59,16 +59,16 @@ def frequency_response(
     >>> found.dimensions, list(found.values)
     (('N', 'omega'), ['amplitude.x', 'stick_fraction.f', 'stops_per_period.f'])
     """
-    model = model_to_sweep(model, params)
+    swept = model_to_sweep(model, params)
     others, frequency = mapping(levels, "levels"), text(frequency, "frequency")
     if len(others) > 1 or frequency in others:
         raise cannot_be("levels", levels, "use one parameter other than the frequency")
-    if not model.states:
-        raise UsageError(f"model {model.name} has no states", remedy="use a model with at least one state")
-    readings = [f"amplitude.{model.states[0].name if quantity is None else text(quantity, 'quantity')}"]
-    for contact in model.contacts:
+    if not swept.states:
+        raise UsageError(f"model {swept.name} has no states", remedy="use a model with at least one state")
+    readings = [f"amplitude.{swept.states[0].name if quantity is None else text(quantity, 'quantity')}"]
+    for contact in swept.contacts:
         readings += [f"stick_fraction.{contact.name}", f"stops_per_period.{contact.name}"]
     # with warm starts the chain runs along the frequency, which is the first axis
     if options.get("warm_start"):
-        return sweep(model, {frequency: frequencies, **others}, readings, **options)
-    return sweep(model, {**others, frequency: frequencies}, readings, **options)
+        return sweep(swept, {frequency: frequencies, **others}, readings, **options)
+    return sweep(swept, {**others, frequency: frequencies}, readings, **options)

@@ -22,7 +22,7 @@ from hybridsim.analysis.steady.together import (
     steady_motions,
 )
 from hybridsim.analysis.structures.result import StructureSteadyState
-from hybridsim.analysis.structures.swept import SweptSystem
+from hybridsim.analysis.structures.swept import is_structure, quantities_of
 from hybridsim.analysis.sweep.last_period import OF_MOTION, LastPeriod, MeasuredPeriod, period_of
 from hybridsim.analysis.sweep.run_readings import (
     FINAL,
@@ -91,7 +91,7 @@ class Steady:
 
         The function `alone` measures the points that compiled code cannot decide.
         """
-        if isinstance(job.model, SweptSystem):
+        if is_structure(job.model):
             return None
         system, checked = system_of(job.model), effort_of(self.options)
         readers = {word: _steady_reader(word, system) for word in self.reading_names}
@@ -162,7 +162,7 @@ def named_measure(
 
 
 def _last_period(reading_names: tuple[str, ...], model: Model, options: dict[str, Any]) -> LastPeriod:
-    if isinstance(model, SweptSystem):
+    if is_structure(model):
         raise UsageError(
             "`after` is not supported for a MechanicalSystem",
             remedy="remove `after`: the readings are then those of the steady state",
@@ -177,7 +177,7 @@ def _last_period(reading_names: tuple[str, ...], model: Model, options: dict[str
 
 def units_of_readings(reading_names: Iterable[str], model: Model) -> dict[str, str]:
     """Return the units of named values that are declared in the model."""
-    if isinstance(model, SweptSystem):
+    if is_structure(model):
         return {}
     known, time = units_of(model), time_unit(model)
     units = {}
@@ -195,7 +195,7 @@ def units_of_readings(reading_names: Iterable[str], model: Model) -> dict[str, s
 def _known(model: Model, of_motion: Sequence[str]) -> list[str]:
     """Return the names of all values of a steady state, with the first harmonic of each quantity."""
     discrete = {d.name for d in model.discrete}
-    names = model.quantities if isinstance(model, SweptSystem) else units_of(model)
+    names = quantities_of(model)
     quantities = [name for name in names if name not in discrete]
     contacts = [contact.name for contact in model.contacts]
     numbered = {"harmonic": ".1"}

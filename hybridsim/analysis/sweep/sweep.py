@@ -154,8 +154,8 @@ def sweep(
     >>> found["value"].tolist()[:2], bool(found.failed.any())
     ([0.0, 0.0], False)
     """
-    model = model_to_sweep(model, params).validate()
-    points = points_of(model, values, mode)
+    swept = model_to_sweep(model, params).validate()
+    points = points_of(swept, values, mode)
     tell, warm_start, names_of_units = (
         callback(progress),
         flag(warm_start, "warm_start"),
@@ -170,10 +170,10 @@ def sweep(
             )
         options["after"] = after
     count = None if workers is None else whole(workers, "workers")
-    measured = measure_of(measure, model, warm_start, options)
+    measured = measure_of(measure, swept, warm_start, options)
     job = Job(
         new_token(),
-        model,
+        swept,
         tuple(axis.name for axis in points.axes),
         frozenset(axis.name for axis in points.axes if axis.is_start),
         measured,
@@ -181,7 +181,7 @@ def sweep(
     )
     began = time.perf_counter()
     asked = (
-        model.to_toml() if model.flow is None else model,
+        swept.to_toml() if swept.flow is None else swept,
         points,
         measure,
         warm_start,
@@ -194,9 +194,9 @@ def sweep(
     found = collected.values(points.shape, nothing)
     known = {axis.name: axis.unit for axis in points.axes if axis.unit}
     if not callable(measure):
-        known |= units_of_readings(found, model)
+        known |= units_of_readings(found, swept)
     return Sweep(
-        declared(model),
+        declared(swept),
         points.mode,
         {axis.name: axis.values for axis in points.axes},
         found,

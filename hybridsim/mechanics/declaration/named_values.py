@@ -46,8 +46,8 @@ def with_values(system: MechanicalSystem, values: Mapping[str, float]) -> Mechan
     for name in values:
         if name not in known:
             raise UsageError(
-                f"{system.name} has no value {name!r} that can be set",
-                remedy=nearest(str(name), known, kind="values"),
+                f"{system.name} has no parameter {name!r} to set",
+                remedy=nearest(str(name), known, kind="parameters"),
             )
     contacts = []
     for contact in system.contacts:
