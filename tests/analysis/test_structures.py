@@ -122,6 +122,9 @@ def test_a_force_below_the_friction_limit_moves_nothing() -> None:
     system = hs.MechanicalSystem([1.0], None, [1.0], [hs.Harmonic(1.0, sin=0.4)], [contact])
     steady = hs.steady_state(system)
     assert (steady.kind, steady.stick_fraction["f"], steady.amplitude["q1"]) == ("equilibrium", 1.0, 0.0)
+    assert "multipliers" in steady.to_dict()["no_multipliers"]
+    with pytest.raises(UsageError, match="sensitivities"):
+        steady.sensitivities()
 
 
 def test_a_frequency_response_is_the_steady_states_over_omega() -> None:

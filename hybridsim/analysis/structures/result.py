@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import cached_property
 from typing import Any, NoReturn
 
@@ -152,8 +153,15 @@ class StructureSteadyState(SteadyState):
     @property
     def multipliers(self) -> NoReturn:
         """Refused, because a run of a `MechanicalSystem` carries no derivatives."""
+        self._refuse_derivatives("multipliers")
+
+    def sensitivities(self, parameters: Sequence[str] | None = None) -> NoReturn:
+        """Refused, because a run of a `MechanicalSystem` carries no derivatives."""
+        self._refuse_derivatives("sensitivities")
+
+    def _refuse_derivatives(self, what: str) -> NoReturn:
         raise UsageError(
-            f"{self.model.name} is a MechanicalSystem, whose steady states have no multipliers",
+            f"{self.model.name} is a MechanicalSystem, whose steady states have no {what}",
             remedy="use hs.steady_state(system.to_model()) if the contact velocities are independent",
         )
 
