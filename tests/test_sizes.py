@@ -22,7 +22,7 @@ COMPILED = {"kernel", "inlined", "allocating_kernel", "polynomial_kernel", "merg
 FILES = {
     "analysis/advise/question.py": 324,
     "analysis/continuation/continuation.py": 323,
-    "analysis/steady/steady_state.py": 472,
+    "analysis/steady/steady_state.py": 469,
     "analysis/variations/carried.py": 343,
     "analysis/variations/off_zero.py": 305,
     "arguments.py": 376,

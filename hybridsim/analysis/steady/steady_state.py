@@ -12,6 +12,7 @@ import numpy as np
 
 from hybridsim import arguments
 from hybridsim.analysis.keyword_options import refuse_unknown
+from hybridsim.analysis.steady.given_period import require_multiple
 from hybridsim.analysis.steady.incommensurate import follow
 from hybridsim.analysis.steady.lyapunov import largest_exponents
 from hybridsim.analysis.steady.motion import (
@@ -40,7 +41,6 @@ from hybridsim.analysis.steady.together import (
     message_of,
     settled,
 )
-from hybridsim.analysis.structures.steady_state import steady_state_of_structure
 from hybridsim.analysis.variations.sensitivities import derivatives
 from hybridsim.analysis.variations.sizes import ranges
 from hybridsim.arguments import cannot_be
@@ -66,7 +66,6 @@ _FEWEST = 4  # passages that are needed for a decision
 _WAIT = 256  # periods that take as long as a few Newton steps
 _MARGIN = 1.1  # on the expected number of periods
 _GROWS = 1.2  # a larger growth means a state that grows without end
-_COMMENSURATE = 1e-9
 _TIGHTER = 1e-2  # the runs' tolerance relative to that of the steady state
 _NOTHING_LEFT = 1e-13  # of the scale that a state once had
 _NEUTRAL = 1e-3  # a smaller exponent per period is zero
@@ -155,12 +154,12 @@ def steady_state(
         arguments.whole_number(count, name, 1, _MAX_PERIODS_EVER)
     report = arguments.callback(progress)
     used = max(_TIGHTER * tol, 10.0 * arguments.SMALLEST_RTOL) if rtol is None else rtol
+    effort = Effort(tol, settle, max_periods)
     if isinstance(model, MechanicalSystem):
-        return steady_state_of_structure(
-            model, params=params, x0=x0, z0=z0, period=period, integrator=integrator,
-            rtol=arguments.relative_tolerance(used), tol=tol, settle=settle, max_periods=max_periods,
-            progress=report, **options,
-        )  # fmt: skip
+        from hybridsim.analysis.structures.steady_state import steady_state_of_structure
+
+        chosen = {"params": params, "x0": x0, "z0": z0, "period": period, "integrator": integrator, **options}
+        return steady_state_of_structure(model, effort, used, report, **chosen)
     system = system_of(model)
     _refuse_what_ends(system, period is not None)
     chosen = {"x0": x0, "z0": z0, "period": period, "integrator": integrator, **options}
@@ -168,12 +167,12 @@ def steady_state(
     if period is None:
         period = own
     else:
-        _check_period(model, arguments.number(period, "period"), own)
+        require_multiple(period, own, f"model {model.name}")
     method = {"integrator": integrator, "rtol": used}
     refuse_unknown([steady_state, simulate], {**method, **options})
     motion = Motion(model, {**method, **options}, {"x0": x0, "z0": z0})
     if own is not None and can_be_compiled(system, chosen):
-        together = settled(motion, Effort(tol, settle, max_periods))
+        together = settled(motion, effort)
         if together is not None:
             return together
     motion.time_budget = _TIME_BUDGET * max(1.0, max_periods / Effort().max_periods)
@@ -433,16 +432,6 @@ def _found(
     message: str = "",
 ) -> SteadyState:
     return SteadyState(motion.unwatched(), kind, orbit, is_free, newton_steps, periods, message or kind)
-
-
-def _check_period(model: Model, period: float, own: float | None) -> None:
-    if not (period > 0.0 and math.isfinite(period)):
-        raise cannot_be("period", period, "use a time above zero")
-    if own is not None and abs(period / own - max(round(period / own), 1)) > _COMMENSURATE * period / own:
-        raise UsageError(
-            f"`period` is {period!r}, but model {model.name} is forced with the period {own!r}",
-            remedy="remove `period`, or use a whole multiple of the forcing period",
-        )
 
 
 def _refuse_what_ends(system: System, has_period: bool) -> None:

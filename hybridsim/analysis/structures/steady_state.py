@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from hybridsim import arguments
+from hybridsim.analysis.steady.given_period import require_multiple
 from hybridsim.analysis.steady.quiet import middle_of_longest
+from hybridsim.analysis.steady.together import Effort
 from hybridsim.analysis.structures.period_map import PeriodMap, forcing_period_of
 from hybridsim.analysis.structures.result import StructureSteadyState
 from hybridsim.analysis.structures.settling import Settled, Settling
@@ -19,22 +20,19 @@ from hybridsim.errors import UsageError, nearest
 from hybridsim.mechanics.declaration.system import MechanicalSystem
 from hybridsim.mechanics.simulate import start_of
 
-_COMMENSURATE = 1e-9
 _NEAR = 1e-6  # of a period: an event this close to its end may be counted twice
 
 
 def steady_state_of_structure(
     system: MechanicalSystem,
+    effort: Effort,
+    rtol: float,
+    progress: Callable[[float], None] | None,
     *,
     params: Mapping[str, Any] | None,
     x0: Mapping[str, float] | Sequence[float] | None,
     period: float | None,
     integrator: str,
-    rtol: float,
-    tol: float,
-    settle: int,
-    max_periods: int,
-    progress: Callable[[float], None] | None,
     **refused: Any,
 ) -> StructureSteadyState:
     """Find the steady motion of a system; `hybridsim.steady_state` describes the arguments and checks most.
@@ -47,15 +45,15 @@ def steady_state_of_structure(
     _refuse(system, integrator, refused)
     if params is not None:
         system = model_to_sweep(system, params).system
-    base = _period(system, period)
+    own = forcing_period_of(system)
+    base = own if period is None else require_multiple(period, own, system.name)
     start = start_of(system, x0)
     announce_compilation()
-    period_map = PeriodMap(system, base, start, rtol)
-    settled = Settling(period_map, tol, settle, max_periods).run(progress)
-    return _result(period_map, settled, max_periods)
+    period_map = PeriodMap(system, base, start, arguments.relative_tolerance(rtol))
+    return _result(period_map, Settling(period_map, *effort).run(progress))
 
 
-def _result(period_map: PeriodMap, settled: Settled, max_periods: int) -> StructureSteadyState:
+def _result(period_map: PeriodMap, settled: Settled) -> StructureSteadyState:
     passings, multiple, followed = settled.passings, settled.multiple or 1, period_map.periods
     residual = passings.residual(multiple)
     if settled.rests:
@@ -73,27 +71,12 @@ def _result(period_map: PeriodMap, settled: Settled, max_periods: int) -> Struct
         if drifting is not None:
             message += f", and {period_map.state_names[drifting]} drifts"
     run = period_map.recorded(multiple, 0.0)
-    times = np.append(np.unique(run.changes[0]), [])
+    times = np.unique(run.changes[0])
     length = multiple * period_map.period
     inside = (times > _NEAR * length) & (times < (1.0 - _NEAR) * length)
     if len(times) and not inside.all():
         run = period_map.recorded(multiple, middle_of_longest(np.sort(times % length), length))
     return StructureSteadyState(run, kind, multiple, residual, followed, message)
-
-
-def _period(system: MechanicalSystem, period: float | None) -> float:
-    own = forcing_period_of(system)
-    if period is None:
-        return own
-    base = arguments.number(period, "period")
-    if not (base > 0.0 and math.isfinite(base)):
-        raise arguments.cannot_be("period", period, "use a time above zero")
-    if abs(base / own - max(round(base / own), 1)) > _COMMENSURATE * base / own:
-        raise UsageError(
-            f"`period` is {base!r}, but {system.name} is forced with the period {own!r}",
-            remedy="remove `period`, or use a whole multiple of the forcing period",
-        )
-    return base
 
 
 def _refuse(system: MechanicalSystem, integrator: str, options: Mapping[str, Any]) -> None:
