@@ -83,6 +83,14 @@ class Orbit:
         """Return the integral over this part of the run, from the values (K, POINTS) at the Gauss points."""
         return float((values @ WEIGHTS) @ (0.5 * self.lengths))
 
+    def mean(self, name: str) -> float:
+        """Return the mean of a quantity over this part of the run."""
+        return self.integral(self.of(name)) / self.duration
+
+    def energy(self, name: str) -> float:
+        """Return the integral of the square of a quantity over this part of the run."""
+        return self.integral(self.of(name) ** 2)
+
     def harmonic(self, name: str, frequency: float) -> complex:
         """Return the amplitude c of q = Re(c exp(i w t)) by an integral over the orbit; for w = 0, c is the mean."""
         total = 0.0 + 0.0j

@@ -132,10 +132,6 @@ class Measures:
         orbit = self._orbit_with(name)
         return float(orbit.extremes[side][orbit.column(name)])
 
-    def _integral(self, name: str, power: int) -> float:
-        orbit = self._orbit_with(name)
-        return orbit.integral(orbit.of(name) ** power)
-
     @property
     def minimum(self) -> ByName:
         """Least value of each quantity over the period."""
@@ -159,12 +155,12 @@ class Measures:
     @property
     def mean(self) -> ByName:
         """Mean of each quantity over the period."""
-        return self._each("mean", lambda q: self._integral(q, 1) / self._orbit_with(q).duration)
+        return self._each("mean", lambda q: self._orbit_with(q).mean(q))
 
     @property
     def energy(self) -> ByName:
         """Integral of q^2 over the period (He et al. 2026, eq. 5)."""
-        return self._each("energy", lambda q: self._integral(q, 2))
+        return self._each("energy", lambda q: self._orbit_with(q).energy(q))
 
     @property
     def rms(self) -> ByName:
@@ -181,9 +177,8 @@ class Measures:
             raise cannot_be(
                 "k", k, "use 0 for the mean, 1 for the fundamental, or 2, 3, ... for higher harmonics"
             )
-        orbit = self._orbit_with(name)
-        frequency = 2.0 * math.pi * k / orbit.duration
-        found = orbit.harmonic(name, frequency)
+        frequency = 2.0 * math.pi * k / self._orbit_with(name).duration
+        found = self._orbit_with(name).harmonic(name, frequency)
         return found * cmath.exp(-1j * frequency * self._phase) if self._phase else found
 
     @property

@@ -12,7 +12,6 @@ import numpy as np
 
 from hybridsim import arguments
 from hybridsim.analysis.keyword_options import refuse_unknown
-from hybridsim.analysis.steady.given_period import require_multiple
 from hybridsim.analysis.steady.incommensurate import follow
 from hybridsim.analysis.steady.lyapunov import largest_exponents
 from hybridsim.analysis.steady.motion import (
@@ -22,6 +21,7 @@ from hybridsim.analysis.steady.motion import (
     Motion,
     Point,
 )
+from hybridsim.analysis.steady.period_argument import require_multiple
 from hybridsim.analysis.steady.result import SteadyState
 from hybridsim.analysis.steady.scales import rounding_of
 from hybridsim.analysis.steady.settling import (

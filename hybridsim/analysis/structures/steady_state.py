@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from hybridsim import arguments
-from hybridsim.analysis.steady.given_period import require_multiple
+from hybridsim.analysis.steady.period_argument import require_multiple
 from hybridsim.analysis.steady.quiet import middle_of_longest
 from hybridsim.analysis.steady.together import Effort
 from hybridsim.analysis.structures.period_map import PeriodMap, forcing_period_of
