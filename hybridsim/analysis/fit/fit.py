@@ -7,15 +7,16 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from scipy.stats import qmc
 
 from hybridsim.analysis.fit.doubts import is_local
+from hybridsim.analysis.fit.effort import Effort
+from hybridsim.analysis.fit.first_guesses import first_guesses, from_further_guesses
 from hybridsim.analysis.fit.record import records_of, refuse_unknowns_of_records
 from hybridsim.analysis.fit.residuals import Residuals
 from hybridsim.analysis.fit.result import Fit
 from hybridsim.analysis.fit.search import Search
 from hybridsim.analysis.fit.summary import summed_up
-from hybridsim.analysis.fit.unknown import Unknown, unknowns_of
+from hybridsim.analysis.fit.unknown import unknowns_of
 from hybridsim.analysis.keyword_options import refuse_unknown
 from hybridsim.analysis.progress import Progress
 from hybridsim.arguments import callback, cannot_be, chosen_model, number, text, whole_number
@@ -25,8 +26,6 @@ from hybridsim.model import Model
 from hybridsim.simulate import simulate
 
 _LOSSES = ("linear", "soft_l1", "huber", "cauchy")
-_SEED = 0  # of the Latin hypercube
-_SCANNED, _FOLLOWED = 60, 6  # of its points, if the first guess leads to a local minimum
 _PASSES = 4  # of the estimate of the noise of several quantities
 _SETTLED = 0.01  # relative change of this estimate
 
@@ -69,11 +68,13 @@ def fit(
     starts : int, optional
         Number of first guesses: the guess of the unknowns, and points of a Latin hypercube between the bounds. The
         best result counts. The default is one guess. If its result may be a local minimum and all bounds are finite,
-        the best 6 of 60 such points follow.
+        the best 6 of 60 such points follow. They are fewer if they would take more than 20 s and more than twice as
+        many runs as the guess. Then the result contains a warning.
     max_evaluations : int, optional
         Largest number of steps from each start.
     progress : bool or callable, optional
-        True shows a bar; a function is called as progress(done, total, text) before each step.
+        True shows a bar; a function is called as progress(done, total, text) before each step. By default, a fit of
+        more than 20 s prints one line on stderr, and False suppresses it.
     **options : Any
         Options of `simulate`, such as ``integrator`` or ``rtol``.
 
@@ -110,7 +111,8 @@ def fit(
     checked = unknowns_of(model, unknowns)
     chosen = records_of(records)
     refuse_unknowns_of_records(chosen, checked)
-    residuals = Residuals(model, chosen, checked, options)
+    effort = Effort(reports=progress is None)
+    residuals = Residuals(model, chosen, checked, options, effort)
     if len(residuals.measured) <= len(checked):
         raise UsageError(
             f"there are {len(residuals.measured)} samples for {len(checked)} unknowns",
@@ -119,18 +121,17 @@ def fit(
     for record in chosen:  # a record of unknown quantities is refused before the first long run
         record.require_quantities(model, _quantities(residuals, record))
     stated = _noise_of(noise, residuals)
-    guesses = _guesses(checked, count)
+    guesses = first_guesses(checked, count)
     spread = {
         name: float(np.std(residuals.measured[residuals.quantity == name])) or 1.0 for name in residuals.names
     }
     search = Search(residuals, loss, most, callback(progress), len(guesses))
     results = [found for guess in guesses if (found := search.best_from(guess, stated or spread)) is not None]
+    limited: tuple[str, ...] = ()
     is_bounded = starts is None and all(unknown.is_bounded for unknown in checked.values())
     if is_bounded and (not results or is_local(residuals, residuals.measured - results[0].predicted)):
-        more = search.most_promising(_guesses(checked, 1 + _SCANNED)[1:], stated or spread)[:_FOLLOWED]
-        results += [
-            found for guess in more if (found := search.best_from(guess, stated or spread)) is not None
-        ]
+        more, limited = from_further_guesses(search, effort, stated or spread, is_limited=bool(results))
+        results += more
     if not results:
         failed = residuals.failure
         raise SimulationError(
@@ -145,7 +146,9 @@ def fit(
         before, sizes = sizes, search.noise_of(best)
         if all(abs(sizes[name] - before[name]) <= _SETTLED * before[name] for name in sizes):
             break
-    return summed_up(model, residuals, checked, best, sizes, is_stated=bool(stated), options=options)
+    return summed_up(
+        model, residuals, checked, best, sizes, is_stated=bool(stated), options=options, further=limited
+    )
 
 
 def _quantities(residuals: Residuals, record: Any) -> tuple[str, ...]:
@@ -175,19 +178,3 @@ def _noise_of(noise: Any, residuals: Residuals) -> dict[str, float] | None:
         if not (value > 0.0 and math.isfinite(value)):
             raise UsageError(f"the noise of {name} is {value!r}", remedy="use a positive number")
     return found
-
-
-def _guesses(unknowns: Mapping[str, Unknown], starts: int) -> list[np.ndarray]:
-    """Return first guesses as coordinates: the guess of each unknown, then a Latin hypercube between the bounds."""
-    first = np.array([u.coordinate(float(u.guess or 0.0)) for u in unknowns.values()])
-    if starts == 1:
-        return [first]
-    for name, unknown in unknowns.items():
-        if not unknown.is_bounded:
-            raise UsageError(
-                f"{name} has no finite bounds, but more than one start needs finite bounds",
-                remedy="give both bounds, or starts=1",
-            )
-    low, high = np.array([unknown.coordinate_bounds for unknown in unknowns.values()]).T
-    points = qmc.LatinHypercube(len(first), seed=_SEED).random(starts - 1)
-    return [first, *(low + points * (high - low))]

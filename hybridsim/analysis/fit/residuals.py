@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from hybridsim.analysis.fit.derivative_costs import DerivativeCosts
+from hybridsim.analysis.fit.effort import Effort
 from hybridsim.analysis.fit.record import Record
 from hybridsim.analysis.fit.slopes_of_run import NoDerivative, slopes_of_run
 from hybridsim.analysis.fit.unknown import Unknown, start_of
@@ -39,6 +40,7 @@ class Residuals:
     ----------
     model, records, unknowns : as in `fit`, checked.
     settings : options of `simulate`.
+    effort : counts the runs. By default there is a new one without reports.
     """
 
     def __init__(
@@ -47,10 +49,11 @@ class Residuals:
         records: tuple[Record, ...],
         unknowns: Mapping[str, Unknown],
         settings: Mapping[str, Any],
+        effort: Effort | None = None,
     ) -> None:
         self.model, self.records, self.unknowns, self._settings = model, records, unknowns, dict(settings)
         self._starts = {start_of(s.name): s.name for s in model.states}
-        self.runs = 0
+        self._effort = effort or Effort(reports=False)
         self.without: dict[int, str] = {}  # numbers of the records without exact derivatives, and the reasons
         self._costs = [DerivativeCosts() for _ in records]
         self._points: dict[
@@ -78,6 +81,11 @@ class Residuals:
         return max(guess, _OF_BOUNDS * spread) or 1.0
 
     @property
+    def runs(self) -> int:
+        """Number of simulations."""
+        return self._effort.runs
+
+    @property
     def names(self) -> tuple[str, ...]:
         """Names of the measured quantities."""
         return tuple(dict.fromkeys(str(name) for name in self.quantity))
@@ -94,7 +102,7 @@ class Residuals:
 
     def solution(self, record: Record, values: Mapping[str, float]) -> Solution:
         """Simulate the experiment of a record with the given values of the unknowns."""
-        self.runs += 1
+        self._effort.add_run()
         starts = {self._starts[name]: value for name, value in values.items() if name in self._starts}
         params = {name: value for name, value in values.items() if name not in self._starts}
         begin = record.t[0] if record.t0 is None else record.t0

@@ -20,9 +20,9 @@ _AT_BOUND = 1e-6  # of an unknown's size
 
 def summed_up(
     model: Model, residuals: Residuals, unknowns: dict[str, Unknown], best: OptimizeResult,
-    noise: dict[str, float], *, is_stated: bool, options: Mapping[str, Any],
+    noise: dict[str, float], *, is_stated: bool, options: Mapping[str, Any], further: tuple[str, ...] = (),
 ) -> Fit:  # fmt: skip
-    """Return the result with the errors of the values."""
+    """Return the result with the errors of the values; `further` are warnings about the search."""
     values = residuals.values(best.x)
     weights = 1.0 / np.array([noise[name] for name in residuals.quantity])
     off = residuals.measured - best.predicted
@@ -60,7 +60,10 @@ def summed_up(
         model=fitted, values=values, errors=errors, covariance=covariance, noise=noise, residuals=tuple(split),
         cost=float(np.sum((off * weights) ** 2)), samples=len(off), runs=residuals.runs,
         undetermined=tuple(map(str, lacking)),
-        warnings=doubts(residuals, off, noise, [names[k] for k in np.flatnonzero(at_bound)], is_stated=is_stated),
+        warnings=(
+            *doubts(residuals, off, noise, [names[k] for k in np.flatnonzero(at_bound)], is_stated=is_stated),
+            *further,
+        ),
         success=best.status > 0, message=str(best.message), records=residuals.records, unknowns=unknowns,
         settings=dict(options), derivatives=residuals.derivatives,
     )  # fmt: skip
