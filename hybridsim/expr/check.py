@@ -248,7 +248,7 @@ def check_size(tree: ast.expr, expr: str, place: Place, max_depth: int, max_node
 
 
 def check_tree(tree: ast.expr, text: str, place: Place, *, columns: bool = True) -> frozenset[str]:
-    """Reject a tree that is not whitelisted, and return the names that it depends on.
+    """Return the names on which a tree depends; reject a tree that is not whitelisted.
 
     ``columns`` is False if the columns of the nodes are not offsets into ``text``, as after a substitution.
     """

@@ -28,9 +28,10 @@ _COMPARE = {
 
 
 def polynomial(node: ast.expr) -> Polynomial:
-    """Return the polynomial of a tree; equal polynomials imply equal values, but not the reverse.
+    """Return the polynomial of a tree; trees with equal polynomials have equal values.
 
-    Decimal numbers have the exact value of their double. Functions and conditions of constants are evaluated.
+    Trees with equal values may have different polynomials. Decimal numbers have the exact value of their double.
+    Functions and conditions of constants are evaluated.
     """
     match node:
         case ast.Constant(value=bool()):

@@ -1,4 +1,4 @@
-"""This module calls Python's parser, without warnings and in one thread at a time, and joins names with dots."""
+"""This module calls Python's parser without warnings, in one thread at a time, and joins dotted names."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def python_tree(text: str, mode: str = "exec") -> Any:
 
 
 def with_dotted_names(tree: ast.expr) -> ast.expr:
-    """Return a tree in which names that are joined by dots are single names; the tree may be changed."""
+    """Return a tree in which names that are joined by dots are single names; the given tree may be modified."""
     if not any(isinstance(node, ast.Attribute) for node in ast.walk(tree)):
         return tree
     joined: ast.expr = _Joined().visit(tree)

@@ -219,7 +219,10 @@ def first_zero(start: Any, model: Any, own: Any, s: float, d: float) -> tuple[in
 
 @kernel
 def expand_at(model: Any, k: int, s: float, x: Any, own: Any) -> None:
-    """Compute Taylor coefficients along the flow from (s, x) with the tape interpreter; see `guards_at_end`."""
+    """Compute Taylor coefficients along the flow from (s, x) with the interpreter of instruction tapes.
+
+    `guards_at_end` calls this kernel if there is no machine code.
+    """
     tapes, inputs, W, n = model.tapes, model.inputs, own.W, x.shape[0]
     rows = tapes.optimised[tapes.optimised_start[k] : tapes.optimised_start[k + 1]]
     if inputs.time[0] >= 0:

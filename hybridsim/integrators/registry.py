@@ -82,7 +82,7 @@ def integrator_class(name: str) -> type[Integrator]:
         remedy = nearest(name, found, kind="integrators")
         raise UsageError(
             f"there is no integrator {name!r}",
-            remedy=f"{remedy} (`hybridsim integrators` and hs.list_integrators() list all)",
+            remedy=f"{remedy} (`hybridsim integrators` and hs.list_integrators() list all integrators)",
         )
     return found[name]
 

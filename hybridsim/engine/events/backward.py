@@ -85,7 +85,7 @@ def entries(system: System, z: np.ndarray) -> tuple[Entry, ...]:
 
 
 def cross_backward(system: System, at: Situation, fired: tuple[int, ...]) -> Outcome:
-    """Cross a surface backward in time if the motion came through the surface, else end as ``backward-nonunique``.
+    """Cross a surface backward in time if the motion crossed it; else end with the status ``backward-nonunique``.
 
     The past is unique if the motion enters from the other side, leaves on this side, and cannot have been held in
     between. For a force with a limit that is a passage of the velocity through zero.

@@ -1,4 +1,4 @@
-"""Reject contacts whose force drives their relative velocity, which usually is a sign error."""
+"""Reject contacts whose force acts along their relative velocity, which is usually a sign error."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def _what_effects_read(
 def require_dissipation(
     system: System, t0: float, x: np.ndarray, discrete: np.ndarray, z: np.ndarray
 ) -> None:
-    """Raise ModelError for a contact whose force drives its own relative velocity."""
+    """Raise ModelError for a contact whose force acts along its relative velocity."""
     accepted, key = _accepted(system), _what_effects_read(system, t0, x, discrete, z)
     if key in accepted:
         return

@@ -80,7 +80,7 @@ def _with_evaluated(
 def apply_crossed(
     system: System, forward: bool, outcome: Outcome, s: float, monitors: MonitorSides
 ) -> Outcome:
-    """Apply the resets of monitors whose side was changed by an event or by another such reset."""
+    """Apply the resets of monitors whose side an event, or the reset of another monitor, has changed."""
     changes = list(outcome.changes)
     while not outcome.status and forward and (due := monitors.fire(outcome, "reset")):
         monitors.fire(outcome)

@@ -26,7 +26,7 @@ _MAX_FLOWS = 3**4  # combinations of modes examined at most; each costs a Taylor
 
 
 def as_read_by_conditions(system: System, at: Situation, jumped: bool = False) -> Situation:
-    """Return the state before an event as conditions and resets read it, without projection.
+    """Return the state before an event for use in conditions and resets; the state is not projected.
 
     At a start some components have no mode yet. They are read in the mode of the side of their surface, or in the
     holding mode if they are at rest on it. At a start and after a jump no state is evaluated from a surface.
@@ -84,7 +84,7 @@ def certainly_leaving(resolution: EventData) -> set[int]:
 
 
 def _modes_on_sides(resolution: EventData) -> tuple[np.ndarray, list[int]]:
-    """Return the modes by the signs of the surfaces, and the components whose surfaces are zero."""
+    """Return the modes that follow from the signs of the surfaces, and the components whose surfaces are zero."""
     at, system = resolution.at, resolution.system
     p = at.p.copy()
     p[system.layout.pin_at] = 0.0

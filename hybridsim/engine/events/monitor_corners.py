@@ -1,4 +1,4 @@
-"""Represent the monitors of a model as corners, so that compiled loops treat zeros of both alike.
+"""Represent the monitors of a model as corners, so that compiled loops treat zeros of monitors like zeros of corners.
 
 A corner of a monitor has two modes, ``+`` and ``-``, in which the monitor is positive and negative. The modes have the
 same rates. A zero of the monitor changes the mode and nothing else. The corners follow all other components, and their
@@ -55,7 +55,7 @@ def _with_corners(model: Model) -> Model:
 
 
 def corners_of_monitors(system: System) -> MonitorCorners | None:
-    """Return the monitors of a system as corners, made once for each system, or None if there are too many."""
+    """Return the monitors of a system as corners, from a cache, or None if corners cannot replace the monitors."""
     if len(system.monitor_names) > MOST or not system.has_tape:
         return None
     if system.with_corners is None:
@@ -81,7 +81,7 @@ class MonitorCorners:
         assert self.system.layout == plain.layout and np.array_equal(self.system.rates, plain.rates)
 
     def numbered(self, fires: np.ndarray, modes: np.ndarray) -> np.ndarray:
-        """Return the numbers of the guards that fired. Each monitor has two more numbers, for the two directions."""
+        """Return the numbers of the guards that fired; each monitor has two numbers, one for each direction."""
         own, components = self.plain.guard_count, len(self.plain.automata)
         events = np.flatnonzero(fires >= own)
         corners = self.system.owner[fires[events]]
@@ -103,7 +103,7 @@ class MonitorCorners:
         return HybridState.of(replace(outcome, z=z, sides=sides, orders=orders, guard_floors=floors), p)
 
     def outcome(self, state: HybridState) -> Outcome:
-        """Return a state of the system with corners as an outcome of the model with monitors."""
+        """Convert a state of the system with corners to an outcome of the model with monitors."""
         whole, own, components = state.outcome(), self.plain.guard_count, len(self.plain.automata)
         modes = whole.z[components:]
         active = self._guards[np.arange(self.count), modes]

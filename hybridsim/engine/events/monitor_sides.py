@@ -60,7 +60,7 @@ class MonitorSides:
         return found
 
     def fire(self, outcome: Outcome | None, action: str = "") -> list[int]:
-        """Mark and return the monitors that fire at this instant, of one action or of all actions.
+        """Mark and return the monitors that fire at this instant and have the given action; by default, any action.
 
         The state after the event decides. With outcome=None, or an outcome that failed, the motion before it decides.
         """

@@ -71,7 +71,7 @@ class Outcome:
         return cls(**state, continuous=bool(arrays["continuous"]))
 
     def leave_zeros(self) -> None:
-        """Take all guards as positive and all monitors as away from zero."""
+        """Mark all guards as positive and all monitors as different from zero."""
         self.sides[:], self.orders[:], self.guard_floors[:] = 1, 0, 0.0
         self.monitor_orders[:], self.monitor_floors[:] = 0, 0.0
 

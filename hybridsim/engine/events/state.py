@@ -75,7 +75,7 @@ class HybridState:
         return values
 
     def divide(self) -> None:
-        """Make this the start of a new segment in the same modes, at which all guards are away from zero."""
+        """Make this state the start of a new segment in unchanged modes, at which no guard is zero."""
         memory, views = self.memory, self._views  # views of arrays cost more than this
         sides, orders, floors, end = (views[name][2] // 8 for name in ("sides", "orders", "floors", "z"))
         memory[floors:end] = memory[orders:] = 0.0

@@ -17,7 +17,7 @@ _SWEEPS = 8  # most sweeps of balancing
 
 @kernel
 def balance(A: Any, horizon: float, sizes: Any, scales: Any, balanced: Any) -> None:
-    """Write powers of two D to `scales` that balance rows and columns of D^-1 A D, and write D^-1 A D to `balanced`.
+    """Balance a matrix A by a diagonal D of powers of two; write D to `scales`, and D^-1 A D to `balanced`.
 
     The method is that of E. E. Osborne, J. ACM 7 (1960) 338. sizes (k, m, m) is scratch.
 

@@ -1,4 +1,4 @@
-"""Compute Taylor coefficients of guards in linear modes, with error bounds, as far as needed.
+"""Compute Taylor coefficients of guards in linear modes, with error bounds, up to the order that is needed.
 
 The point is y = (x_after, w): the states after an event, and the functions of time.
 """

@@ -121,7 +121,7 @@ class MatrixTemplate:
 
 @kernel
 def put_entries(registers: Any, entries: Any, out: Any) -> None:
-    """For each row of registers, write the entries of some matrices one after the other."""
+    """Write the entries of some matrices, one after the other, for each row of registers."""
     size = out.shape[0] // registers.shape[0]
     for point in range(registers.shape[0]):
         for j in range(entries.shape[1]):
@@ -180,7 +180,7 @@ def _that_holds(
 def _begun(
     cached: dict[bytes, list[MatrixTemplate]], met: np.ndarray, inputs: np.ndarray
 ) -> MatrixTemplate | None:
-    """Return the template of the longest cached list of modes with which the given list begins."""
+    """Return the template of the longest cached list of modes that is a prefix of the given list."""
     whole = met.tobytes()
     for key in sorted((key for key in cached if whole.startswith(key)), key=len, reverse=True):
         found = _that_holds(cached[key], inputs)

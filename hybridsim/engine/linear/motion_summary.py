@@ -32,7 +32,7 @@ class MotionSummary(NamedTuple):
 
 @inlined
 def _state_and_slope(lin: Any, k: int, i: int, v: Any) -> tuple[float, float]:
-    """Return a state at modal coordinates v, and its rate along c' = B c."""
+    """Return a state and its rate at modal coordinates v, which satisfy v' = B v."""
     value = slope = 0.0
     for j in range(lin.counts[k]):
         b, change = lin.basis[k, i, j], lin.values[k, j] * v[j]

@@ -67,7 +67,7 @@ class Numbers:
 
 
 def _operators(op: int) -> tuple[Any, Any]:
-    """Return the methods of `Traced` for an operation with its operands in order, and exchanged."""
+    """Return two methods of `Traced` for an operation: one keeps the order of the operands, one exchanges them."""
 
     def first(self: Traced, other: float) -> Traced:
         return self.numbers.operation(op, (self, other))[0]

@@ -132,7 +132,7 @@ class _Rows:
         return tables
 
     def gone_on_with(self, first: int, count: int) -> _Rows:
-        """Return `count` rows that include the first rows; spare rows behind the first rows are used if free."""
+        """Return this memory, extended to `count` rows, or a larger copy if the spare rows are not free."""
         with _lock:
             rows = self
             if self.count != first or count > self.most:
@@ -251,7 +251,7 @@ def tables_of(
 
 
 class TableCache(dict[tuple[Any, ...], Made]):
-    """The last tables of a structure, by parameters, mode vectors and horizon."""
+    """A cache of the latest tables of a structure, by parameters, mode vectors and horizon."""
 
     size = 0  # bytes of all tables
 

@@ -81,7 +81,7 @@ class HeldStates:
         return tuple(i for i, x in enumerate(self.states) if x in self.surfaces[c].free_symbols)
 
     def _without_choice(self, choices: dict[Held, list[int]]) -> set[Held]:
-        """Return the constraints that need projection: nonlinear ones, and constraints that share states with them."""
+        """Return the constraints that need projection: they are nonlinear, or share states with a nonlinear one."""
         found = {c for c, states in choices.items() if not states}
         for c in found:
             surface = self.lowering.components[c[0]].surface
@@ -100,7 +100,7 @@ class HeldStates:
         return found
 
     def _chosen(self, choices: dict[Held, list[int]], free: set[Held]) -> dict[Held, int] | None:
-        """Choose a different state for each constraint without projection, or None if that is impossible."""
+        """Return a different state for each constraint without projection, or None if there is no such choice."""
         pinned = {c: found for c, found in choices.items() if c not in free}
         return self._match(list(pinned), pinned, {})
 

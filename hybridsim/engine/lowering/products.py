@@ -17,7 +17,7 @@ from hybridsim.engine.lowering.program import Assign, Item, Switch
 
 
 class Products:
-    """The values of unknowns in products, and the pairs of unknowns that never hold together."""
+    """The values of unknowns in products, and the pairs of unknowns whose surfaces are never held together."""
 
     def __init__(self, lowering: LoweringState, unknown: dict[int, Any]) -> None:
         self.lowering, self.unknown = lowering, unknown
@@ -69,7 +69,7 @@ class Products:
         return pull
 
     def diagonal(self, c: int, entry: Any) -> Any:
-        """Return the effect of unknown `c` on surface `c`, plus 1 per factor of its products that holds with `c`."""
+        """Return the effect of unknown `c` on surface `c`, plus 1 for each factor of its products held with `c`."""
         return entry + sum(
             self._holds(c) * self._holds(d)
             for d in sorted({e for p in self.pairs if c in p for e in p} - {c})

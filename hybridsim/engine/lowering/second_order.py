@@ -67,7 +67,7 @@ def partners(
 
 
 def attraction(lowering: LoweringState, c: int, partner: Partner, effect: dict[tuple[int, int], Any]) -> Item:
-    """Return the item that computes the attraction of relay `c` by the second derivative while its partner holds."""
+    """Return the item that computes the attraction of relay `c` by the second derivative while its partner is held."""
     sp, other = lowering.sp, lowering.components[partner.component]
     name = user(ATTRACTION + lowering.components[c].surface.unknown)
     pull = -partner.factor * effect[partner.component, c]

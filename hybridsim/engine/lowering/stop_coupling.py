@@ -50,7 +50,7 @@ def stop_couplings(
 def without_share(
     lowering: LoweringState, pairs: list[StopCoupling], c: int, d: int, entry: Any, of_held: Any
 ) -> tuple[list[Item], Any]:
-    """Return an entry of contact `c` that becomes `of_held` while a gap along `c` is closed, with program items."""
+    """Return an entry of contact `c` and its program items; the entry is `of_held` while a gap along `c` is closed."""
     items: list[Item] = []
     for tie in pairs:
         if tie.along == c:

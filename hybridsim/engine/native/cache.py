@@ -54,7 +54,7 @@ def cache_root() -> Path | None:
 
 @cache
 def _is_usable(folder: Path) -> bool:
-    """Return whether a folder exists or can be created and is private; print a reason if not."""
+    """Return whether a private folder exists or can be created; if not, print the reason."""
     reason = why_not(folder)
     if reason is None:
         try:

@@ -1,4 +1,4 @@
-"""This module sets the compiler for kernels, and measures the time that it takes.
+"""This module sets the options of the compiler for kernels, and measures the compile time.
 
 Without the compiler (``HYBRIDSIM_JIT=0``) all kernels run as plain Python.
 """

@@ -65,7 +65,7 @@ class SegmentBlock(Sequence[Segment]):
 
     @abstractmethod
     def knots(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return all steps: segment numbers (m,), local times (m,) and states (m, n), including ends."""
+        """Return all steps with the ends of segments: segment numbers (m,), local times (m,) and states (m, n)."""
 
     @abstractmethod
     def since(self, first: int) -> SegmentBlock:

@@ -12,7 +12,7 @@ from hybridsim.errors import UsageError
 
 
 class Pace(NamedTuple):
-    """The intervals between events of one component, in the form in which they are stored for a checkpoint."""
+    """The stored form of the intervals between events of one component, for a checkpoint."""
 
     last: Instant | None  # the last event
     intervals: tuple[float, ...]  # intervals before it

@@ -18,7 +18,7 @@ class Counters:
     kernel_time: float = 0.0  # seconds in the compiled mode loop
 
     def copy(self) -> Counters:
-        """Return a copy that counts other work."""
+        """Return a separate copy of the counters."""
         other = object.__new__(Counters)
         other.__dict__.update(self.__dict__)
         return other

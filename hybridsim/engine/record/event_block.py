@@ -92,7 +92,7 @@ _take_part, _times_of_one = Precompiled(_taking_part), Precompiled(_times_at)
 
 
 class EventBlock(Sequence[Occurrence]):
-    """Events in arrays, each with one entry for every component that changes its mode or is reset.
+    """Events in arrays; an event has one entry for every component that changes its mode or is reset.
 
     A monitor or a schedule has one entry as well.
 

@@ -69,7 +69,7 @@ def values_at(
 def _interpreted_values(
     rows: Any, flow_registers: Any, s: float, x: Any, guard_registers: Any, W: Any, values: Any, rates: Any
 ) -> None:
-    """Compute rates of the states and values of the guards with the tape interpreter."""
+    """Compute rates of the states and values of the guards with the interpreter of instruction tapes."""
     time, states, derivatives = flow_registers
     if time >= 0:
         W[time, 0] = s
@@ -109,7 +109,7 @@ def look_ahead(
 def _interpreted_ahead(
     tape: Any, order: int, s: float, d: float, series: Any, U: Any, W: Any, ahead: Any
 ) -> None:
-    """Fill the array of `look_ahead` with the tape interpreter."""
+    """Fill the array of `look_ahead` with the interpreter of instruction tapes."""
     rows, flow_registers, guard_registers = tape
     n, count = series.shape[0], guard_registers.shape[0]
     tabulate(d, order, ahead)

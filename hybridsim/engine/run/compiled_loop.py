@@ -111,7 +111,7 @@ class CompiledLoop:
         self.corners, self.system, self.kernels.recorded = corners, corners.plain, corners.plain
 
     def look_ahead(self, timetable: Timetable, end: Instant) -> None:
-        """Let the calls pass the known times up to the end of the run."""
+        """Prepare the known times up to the end of the run, which later calls process."""
         self.times_ahead = TimesAhead(self.kernels.system, timetable, end)
 
     def fresh_copy(self) -> CompiledLoop:

@@ -145,7 +145,7 @@ class KernelRun:
 
     @property
     def is_full(self) -> bool:
-        """Return whether the next call continues because arrays were full or only some known times were passed."""
+        """Return whether the call ended early, because arrays were full or it included only some known times."""
         return self.code == FULL or (self.code == AT_TARGET and not self.is_at_target)
 
     @property

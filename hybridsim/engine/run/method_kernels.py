@@ -106,7 +106,7 @@ class MethodKernels(ABC):
         """Return the segments of a call as one block; `last_steps` contains the last step of each segment."""
 
     def part_of(self, known: KnownTimes) -> KnownTimes:
-        """Return the known times that one call can pass: all of the given times, or the first of them."""
+        """Return the known times that one call can process: all of the given times, or only the first times."""
         return known
 
     def tables(

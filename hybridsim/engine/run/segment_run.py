@@ -191,7 +191,7 @@ class SegmentRun:
         )
 
     def carry_on(self, arrival: Arrival, s: float) -> Arrival:
-        """Return the end of the segment at a time that differs by rounding only."""
+        """Return the end of the segment, moved to a time that differs from the end time by rounding only."""
         if not self.interpolants:
             return arrival
         before, after = self.interpolants[-1](np.array([arrival.s, s]))
@@ -308,7 +308,7 @@ class SegmentRun:
                 self.locator.monitor_sides[hit.number] = hit.direction
 
     def _at_step_end(self, step: Step, found: Findings) -> tuple[Step, Arrival | None]:
-        """Set the sides of guards and monitors for the next step; a zero at the end belongs to this step.
+        """Set the sides of guards and monitors for the next step; a zero at the end of a step belongs to that step.
 
         A guard that the search left undecided and that is negative beyond rounding at the end was zero before it.
         """

@@ -170,7 +170,7 @@ class Method(Protocol):
 
     @property
     def lacks(self) -> Mapping[str, str]:
-        """Return the missing capabilities with reasons; "adaptive" marks a method with a fixed step and no rtol."""
+        """Return the missing capabilities with reasons; "adaptive" is missing for a fixed step without rtol."""
 
     @property
     def dense_is_accurate(self) -> bool:

@@ -83,7 +83,7 @@ def times(instant: Instant, factor: float) -> Instant:
 
 
 def multiple(start: float, k: int, period: float) -> Instant:
-    """Return the k-th scheduled time, start + k*period, without a sum of rounding errors."""
+    """Return the k-th scheduled time, start + k*period, without accumulated rounding errors."""
     high, error = two_product(float(k), period)
     total, rest = two_sum(start, high)
     return Instant(*two_sum(total, rest + error))

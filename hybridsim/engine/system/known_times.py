@@ -54,7 +54,7 @@ class KnownTimes(NamedTuple):
 
     @property
     def first(self) -> Instant:
-        """Return the first of the times, or the target."""
+        """Return the first known time, or the target if there is no known time."""
         return self.instant(0) if len(self.kinds) else self.target
 
     def instant(self, i: int) -> Instant:
@@ -62,7 +62,7 @@ class KnownTimes(NamedTuple):
         return Instant(*self.instants[i].tolist())
 
     def up_to(self, target: Instant) -> KnownTimes:
-        """Return the known times before another target."""
+        """Return the known times before `target`, which is the target of the result."""
         if target == self.target:
             return self
         m = int(np.count_nonzero(_minus(self.instants, np.array([target])) < 0.0))
@@ -100,7 +100,7 @@ class KnownTimes(NamedTuple):
 
 
 class TimesAhead:
-    """The known times ahead of one run forward in time, which compiled loops pass without Python.
+    """The known times of one run forward in time, which compiled loops process without Python.
 
     due: the schedules of each kind of known time. resets (MAX_KINDS, width): the numbers of their resets, ended by -1.
     """

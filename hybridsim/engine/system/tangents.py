@@ -20,7 +20,7 @@ from hybridsim.engine.system.system import System
 
 @inlined
 def _combine(D: Any, out: int, first: float, a: int, second: float, b: int) -> None:
-    """Set D[out] = first * D[a] + second * D[b], where a zero derivative times an infinite factor is zero."""
+    """Set D[out] = first * D[a] + second * D[b]; a zero derivative times an infinite factor is zero."""
     for j in range(D.shape[1]):
         total = 0.0
         if D[a, j] != 0.0:
@@ -205,7 +205,7 @@ class TangentTape:
     def _along(
         self, s: np.ndarray, x: np.ndarray, p: np.ndarray, seeds: np.ndarray
     ) -> tuple[Tangents, np.ndarray]:
-        """Return values and derivatives by the rules of the operations, and the mask of points at an edge."""
+        """Return values, derivatives by the rules of the operations, and a mask of points that may lack derivatives."""
         count, outputs, directions = self._registers.count, len(self._outputs), seeds.shape[1]
         values, slopes = np.empty((len(s), outputs + 1)), np.empty((len(s), outputs, directions))
         run_tangents(

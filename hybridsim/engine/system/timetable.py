@@ -115,7 +115,7 @@ class Timetable:
         return np.asarray(2.0 * np.spacing(np.maximum(np.abs(near), largest)))
 
     def _count(self, k: int, instant: Instant) -> int:
-        """Return how many open times of a schedule equal an instant within rounding; 1 for a clock."""
+        """Return how many pending times of a schedule equal an instant within rounding; the result is 1 for a clock."""
         times, wide = self._schedules[k][0], 2.0 * self._slack(instant)
         if not times:
             return 1

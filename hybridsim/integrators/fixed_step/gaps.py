@@ -1,4 +1,4 @@
-"""This module finds the signs of the gaps of unilateral contacts at a step."""
+"""This module finds the signs of the gaps of unilateral contacts at a given state."""
 
 from __future__ import annotations
 

@@ -70,7 +70,7 @@ def _halve_step(
     guards: Any,
     counters: Any,
 ) -> float:
-    """Bisect a step until surface `row` is within `eps` of zero, or for row < 0 until a stick limit is passed.
+    """Bisect a step until surface `row` is within `eps` of zero, or for row < 0 until a stick limit is exceeded.
 
     Write the results of the last step to `out` and return its length.
     """

@@ -65,7 +65,7 @@ def series_at(
 def _interpreted_series(
     tape: Any, order: int, s: float, x: Any, guard_registers: Any, fading: Any, V: Any, U: Any, out: Any
 ) -> None:
-    """Write the Taylor coefficients of `series_at` with the tape interpreter."""
+    """Write the Taylor coefficients of `series_at` with the interpreter of instruction tapes."""
     rows, high, flow_registers = tape
     expand(rows, high, flow_registers, order, s, x, V)
     states = flow_registers[1]

@@ -1,4 +1,4 @@
-"""Judge the combinations of modes on which the choice at the surfaces of a cluster depends."""
+"""This module determines verdicts on the combinations of modes from which the modes of a cluster are chosen."""
 
 from __future__ import annotations
 

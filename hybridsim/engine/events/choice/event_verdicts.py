@@ -65,7 +65,7 @@ class EventVerdicts(EventData):
         return int(_verdict(self.automata, None, 0, self.judged(z), z, members, continuous, True, 0))
 
     def is_continuous(self, z: np.ndarray, components: Iterable[int]) -> bool:
-        """Return whether the changes of mode so far have left all unknowns unchanged."""
+        """Return whether the changes of mode of this event up to the modes `z` leave all unknowns continuous."""
         if self.jumped:
             return False
         members, event = np.array(list(components), dtype=np.int64), self.event()

@@ -52,7 +52,7 @@ def is_one_motion(resolution: EventVerdicts, members: list[int], candidates: np.
 
 
 def on_its_side(resolution: EventVerdicts, members: list[int], candidates: np.ndarray) -> int:
-    """Return the number of the first candidate whose motion agrees with its sides of all surfaces, or 0 if none does.
+    """Return the number of the first candidate whose motion lies on the side that each of its modes requires, or 0.
 
     A body at rest may slip either way within rounding. Its holding mode leaves it a speed, or a rate, of some sign.
     """
@@ -187,7 +187,7 @@ def _message_on_negative_guard(resolution: EventVerdicts) -> str:
 
 
 def _message_on_opposed_modes(resolution: EventVerdicts) -> str:
-    """Return a hint on two modes that drive the motion against each other across one surface."""
+    """Return a hint on two modes if each mode moves the state across the same surface into the other mode."""
     model, last = resolution.system.model, resolution.changes[-2:]
     if len(last) < 2 or last[0].component != last[1].component or last[0].source != last[1].target:
         return ""

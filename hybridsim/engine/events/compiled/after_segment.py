@@ -58,7 +58,7 @@ def spread(steps: int, rounding: float) -> float:
 
 @inlined
 def is_shallow(slope: float, bend: float, length: float) -> bool:
-    """Return whether a guard located at zero turns back so soon that it may only touch zero.
+    """Return whether a guard with a located zero rises again so soon that it may only touch zero.
 
     slope, bend: its first and second Taylor coefficient there. length: of the step before, which gives its size.
     `is_hidden` decides then.
@@ -87,7 +87,7 @@ def fill_guard_series(model: Any, s: float, s_error: float, state: Any, work: An
 def is_hidden(
     model: Any, g: int, slope: float, bend: float, s: float, s_error: float, state: Any, work: Any
 ) -> bool:
-    """Return whether a guard turns back while it is still below the rounding error of its expression.
+    """Return whether a guard starts to rise again before its size exceeds the rounding error of its expression.
 
     The state is that in the work space, at local time s.
     """
@@ -115,7 +115,7 @@ def differ_by_rounding(model: Any, k: int, s: float, values: Any, sums: Any, sta
 
 @inlined
 def moved_on(high: float, low: float, s: float) -> tuple[float, float]:
-    """Return the instant (high, low) that is later by the time s."""
+    """Return the sum of the instant (high, low) and the time s."""
     high, rest = two_sum(high, s)
     return two_sum(high, rest + low)
 

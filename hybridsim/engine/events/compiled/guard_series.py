@@ -14,7 +14,10 @@ from hybridsim.engine.series.bounded import run_series
 def interpreted_series(
     tapes: Any, inputs: Any, k: int, s: float, s_error: float, x: Any, x_error: Any, p: Any, work: Any
 ) -> int:
-    """Compute `guard_series` with the tape interpreter. Compiled code calls this kernel by its address."""
+    """Compute `guard_series` with the interpreter of instruction tapes.
+
+    Compiled code calls this kernel by its address.
+    """
     judged, V, E = work.judged, work.V, work.E
     constant = tapes.constant[tapes.constant_start[k] : tapes.constant_start[k + 1]]
     rows = tapes.optimised[tapes.optimised_start[k] : tapes.optimised_start[k + 1]]
@@ -46,7 +49,7 @@ def guard_series(tapes: Any, inputs: Any, lin: Any, k: int, at: Any, x: Any, x_e
 
 @inlined
 def is_continuous(automata: Any, at: Any, z: Any, members: Any, work: Any) -> bool:
-    """Return whether every change of mode in some components is a release without a jump of an unknown."""
+    """Return whether every change of mode of some components is a release at which no unknown jumps."""
     kind = kind_of_change(automata, work, z, members)
     if kind == RELEASED:
         call(called_by(work).jumps, at.s, work.x_after, at.p, z, work.jumps)

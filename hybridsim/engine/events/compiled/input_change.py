@@ -70,7 +70,7 @@ def admit_modes(
     state: Any,
     work: Any,
 ) -> bool:
-    """Return whether the modes in `state` certainly stay admissible when its run-time vector changes.
+    """Return whether the modes in `state` certainly stay admissible when the run-time vector of `state` changes.
 
     none: empty tables, so that guards are judged by the tape. tape: `SurfaceTape` of the modes. pin_at: position of
     the pin in p. former: the run-time vector before the change.

@@ -117,7 +117,7 @@ def errors_at_known_time(model: Any, loop: Any, s: float, steps: int, state: Any
 
 @inlined
 def apply_resets(loop: Any, kind: int, state: Any, work: Any) -> bool:
-    """Write the discrete states after the resets of a kind to p_after; return False if a state is not finite.
+    """Write the discrete states after the resets of a known time to p_after; return False if a state is not finite.
 
     All resets read the values before, with the inputs after the known time. They set different discrete states.
     """

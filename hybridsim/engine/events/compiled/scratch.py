@@ -162,7 +162,7 @@ def work_space(system: Any, atoms: int = 0, monomials: int = 0) -> EventScratch:
 
 
 def _atoms(count: int) -> np.ndarray:
-    """Return an array for the values and errors of `count` atoms, and for the constant one."""
+    """Return an array for the values and errors of `count` functions of time, and of the constant 1."""
     factors = np.zeros((2 * count + 1, 2))
     factors[-1, 0] = 1.0
     return factors

@@ -160,7 +160,7 @@ def _same(one: Answer, other: Answer) -> bool:
 
 
 def _between(problem: ImpactProblem, dead: Answer, lively: Answer) -> Answer:
-    """Return the farthest impulses on the line from `dead` to `lively` at which the work is not positive.
+    """Return the last impulses on the line from `dead` to `lively` at which the work is not positive.
 
     The work is quadratic in the position w on this line, not positive at 0 and positive at 1.
     """

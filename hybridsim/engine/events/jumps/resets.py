@@ -1,4 +1,4 @@
-"""Apply the resets of one instant together: each reads the state before any reset is applied.
+"""Apply the resets of one instant together: every reset reads the state before the first reset.
 
 Each new value carries an error bound, from the values it was made of and from its own evaluation.
 """

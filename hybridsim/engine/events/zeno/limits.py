@@ -90,7 +90,7 @@ def _moved(system: System, x: np.ndarray, p: np.ndarray, z: np.ndarray, s0: floa
 def _held_at(
     system: System, outcome: Outcome, p: np.ndarray, s: float, near: list[int], x: np.ndarray, z: np.ndarray
 ) -> Outcome | None:
-    """Return the outcome at local time `s` with nearby surfaces at zero, or None if a surface cannot be held there."""
+    """Return the outcome at local time `s` with nearby surfaces at zero, or None if there is no such outcome."""
     if not np.isfinite(x).all():
         return None
     z = z.copy()

@@ -51,7 +51,7 @@ def mode_tape(system: System, z: np.ndarray) -> ModeTape:
 
 
 def _holding(system: System, z: np.ndarray) -> Iterator[int]:
-    """Yield the registers of a condition that is true in every mode: held states follow from constraints."""
+    """Yield the registers of the condition that held states follow from constraints, which is true in every mode."""
     tape = system.code.data["tape"]
     zeros = [register for register, value, _ in tape["constants"] if value == 0.0]
     pins = [register for register, source in tape["parameters"] if source == system.layout.pin_at]
@@ -61,7 +61,7 @@ def _holding(system: System, z: np.ndarray) -> Iterator[int]:
 
 
 def computed_rates(system: System, z: np.ndarray) -> list[bool]:
-    """Return for each state whether its rate is computed. A rate that is constant, held or a state is not computed."""
+    """Return for each state whether an instruction computes its rate; a constant, held or copied rate needs none."""
     tape, sure = system.optimised_tape(z), frozenset(_holding(system, z))
     rows = _rows(tape.rows)
     chosen = {out: b for op, a, b, _, out in rows if op == SELECT and a in sure}
