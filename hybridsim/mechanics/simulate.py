@@ -65,7 +65,7 @@ def simulate_mechanical(
     if system.impacts and name != "moreau":
         raise UsageError(
             f"{name} cannot simulate a MechanicalSystem with impacts",
-            remedy=f'use integrator="moreau", step=..., or simulate to_model() of a small system {_INDEPENDENT}',
+            remedy=f'use integrator="moreau", step=..., or convert a small system by to_model() {_INDEPENDENT}',
         )
     method: Any = None
     if name == "moreau":

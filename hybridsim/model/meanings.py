@@ -83,7 +83,7 @@ class Meanings:
         return inner
 
     def family(self, node: ast.expr) -> tuple[Family, int]:
-        """Return the family of an expression, which it shares with its multiples, and its relative sign."""
+        """Return the family of an expression and its multiples, and the sign of the expression in the family."""
         p: Polynomial = polynomial(self.written_out(node))
         number = constant_of(p)
         if number is not None:

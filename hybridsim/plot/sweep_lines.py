@@ -48,7 +48,7 @@ def sweep_lines(
     if len(dimensions) > 2:
         raise UsageError(
             f"the sweep has {len(dimensions)} parameters",
-            remedy="at most two can be drawn; select a part of the sweep with to_xarray().sel(...)",
+            remedy="select a part with at most two parameters by to_xarray().sel(...)",
         )
     lengths = dict(zip(dimensions, result.status.shape, strict=True))
     across = over

@@ -23,7 +23,7 @@ class Ownership:
             raise UsageError(
                 f"the simulator of model {self._name} belongs to thread {self._owner.name!r}, and {here.name!r} "
                 f"called {call}()",
-                remedy="let the other thread work on its own sim.copy()",
+                remedy="use a separate sim.copy() in the other thread",
             )
         if self._is_busy:
             raise UsageError(

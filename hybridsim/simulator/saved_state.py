@@ -69,7 +69,7 @@ def require_fit(saved: SavedState, model: Model, about: str) -> None:
         what = f"other settings, {saved.about}" if fits else f"another model, {own.name}"
         raise UsageError(
             f"`saved` belongs to {what}",
-            remedy="restore the saved state in a simulator like the one that saved it",
+            remedy="restore the saved state in a simulator with the same model and settings",
         )
 
 

@@ -229,7 +229,7 @@ def test_a_declaration_that_does_not_fit_is_refused() -> None:
     with pytest.raises(hs.UsageError, match="direction is zero"):
         hs.MechanicalImpact("p", [0.0], 0.0, 0.5)
     stop = hs.MechanicalImpact("p", {3: 1.0}, 0.0, 0.5)
-    with pytest.raises(hs.UsageError, match="impact p: its direction has the coordinate 3, but there are 2"):
+    with pytest.raises(hs.UsageError, match="impact p: its direction has coordinate 3, but there are 2"):
         hs.MechanicalSystem([1, 1], None, None, impacts=[stop])
     rub = hs.MechanicalContact("p", {0: 1.0}, 1.0, "coulomb", {"mu": 0.1})
     with pytest.raises(hs.UsageError, match="impacts contain"):

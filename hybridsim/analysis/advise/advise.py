@@ -137,7 +137,7 @@ def advise(
         if ranges is not None:
             raise UsageError(
                 "`over` and `uncertain` cannot be combined",
-                remedy="remove one of them; `uncertain` is for a single point",
+                remedy="remove `over` or `uncertain`; `uncertain` is for a single point",
             )
         options = {"mode": mode, "workers": workers, "progress": progress}
         limits = Limits(spending, _LEAST_AT_A_POINT, repeat=False)

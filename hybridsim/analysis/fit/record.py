@@ -60,7 +60,7 @@ class Record:
         columns = _columns(self.data, self.quantities)
         if "t" not in columns:
             raise UsageError(
-                f"the `data` of the record have no column 't', but {', '.join(columns) or 'no columns'}",
+                f"the `data` of the record have no column 't'; the columns are: {', '.join(columns) or 'none'}",
                 remedy="name the column of times t, or rename it: quantities={'time': 't'}, "
                 "on the command line --column time=t",
             )

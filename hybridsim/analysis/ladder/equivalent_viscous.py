@@ -166,7 +166,7 @@ def _solve_one(balanced: Callable[[float], float], start: float) -> np.ndarray:
     low = start / _BELOW
     if balanced(low) < low:
         raise DoesNotApply(
-            "the harmonic balance has no solution: it would need less than 1/1000 of the damping "
+            "the harmonic balance has no solution with more than 1/1000 of the damping that is "
             "estimated from the frictionless motion"
         )
     high = 2.0 * low

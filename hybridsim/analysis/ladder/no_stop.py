@@ -132,7 +132,7 @@ def held(model: Model) -> _Held:
     load = s.stiffness * amplitude - s.force * math.sin(angle)
     if load < s.stick_limit:
         raise DoesNotApply(
-            f"the motion stops: at its turning points the load {load:.4g} is below the stick limit"
+            f"the motion stops: the load {load:.4g} at the turning points is below the stick limit"
         )
     return _Held(found, amplitude, angle, s.damping > 0.0 and s.stick_limit == s.slip_force)
 

@@ -117,7 +117,9 @@ def models_under(model: Model, laws: Iterable[Entry], contact: str) -> dict[str,
         if label in found and values:
             label += f" ({', '.join(f'{name}={value}' for name, value in values.items())})"
         if label in found:
-            raise UsageError(f"`laws` contains '{label}' twice", remedy="pass each law with other parameters")
+            raise UsageError(
+                f"`laws` contains '{label}' twice", remedy="pass the law with different parameters"
+            )
         found[label] = changed
     if not found:
         raise cannot_be("laws", laws, _LAWS)

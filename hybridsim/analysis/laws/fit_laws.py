@@ -88,9 +88,7 @@ def fit_laws(
     ('coulomb', 'viscous')
     """
     if "loss" in options:
-        raise UsageError(
-            "fit_laws() has no option `loss`", remedy="remove `loss`: the criterion is for squares"
-        )
+        raise UsageError("fit_laws() has no option `loss`", remedy="remove `loss`: AICc needs least squares")
     model = chosen_model(model, None).validate()
     contact = contact_of(model, contact)
     if not is_row(laws):

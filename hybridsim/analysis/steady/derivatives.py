@@ -153,7 +153,7 @@ def steady_sensitivities(
     near = np.abs(multipliers - 1.0)
     if len(near) and near.min() <= _NEUTRAL:
         raise UsageError(
-            f"the motion has the multiplier {multipliers[np.argmin(near)]:.9g}: it is one of a family or at a fold, so "
+            f"the motion has the multiplier {multipliers[np.argmin(near)]:.9g}: it is in a family or at a fold, so "
             "it has no derivatives by parameters",
             remedy="use other parameters, or hs.sensitivities for a run from a fixed start",
         )
@@ -164,7 +164,7 @@ def steady_sensitivities(
     if not np.isfinite(end).all():
         raise UsageError(
             "the motion has no derivatives: " + "; ".join(name for name, _ in over.differing()),
-            remedy="use other parameters, at which the motion is not exactly at this zero",
+            remedy="use other parameters, at which the function is not exactly zero",
         )
     monodromy, by = end[:, :count], end[:, count:]
     rates = np.append(rates_at_end(solution), np.zeros(count - system.n))
@@ -205,15 +205,15 @@ def _relative_periods(
         found.append(slope / evaluate(period, system.values))
     if not found:
         raise UsageError(
-            "the period of the motion was given as a number, so its derivatives by parameters are unknown",
+            "the period of the motion was given as a number, so the derivatives of the period are unknown",
             remedy="write the forcing with sin or cos of an angle, or as an input with a period",
         )
     apart = np.ptp(found, axis=0) > _ALIKE * np.abs(found).max(axis=0)
     if apart.any():
         raise UsageError(
             f"a change of {' and '.join(np.array(parameters)[apart])} changes the periods of the forcing by different "
-            "factors: the motion no longer repeats, and so has no derivatives",
-            remedy="do not request these parameters, or make all periods expressions of one parameter",
+            "factors, after which the motion does not repeat: it has no derivatives by these parameters",
+            remedy="request other derivatives, or write all periods as expressions of one parameter",
         )
     return np.asarray(found[0])
 
@@ -235,5 +235,5 @@ def _refuse_grazing(solution: Solution, orbit: Orbit) -> None:
             raise UsageError(
                 f"at t = {solution.t_start + t:.9g} {solution._system.guard_title(guards[quantity], z)} touches zero "
                 "without an event (a graze), so the motion has no derivatives",
-                remedy="use other parameters, at which the guard stays away from zero or passes it",
+                remedy="use other parameters, at which the guard stays away from zero or passes through zero",
             )

@@ -58,5 +58,5 @@ def _reading(name: str, value: Any) -> Reading:
             pass
     raise UsageError(
         f"the measure returned {type(value).__name__} as {name}",
-        remedy="let the measure return a number, a one-dimensional array, or a dict of names and such values",
+        remedy="return a number, a one-dimensional array, or a dict whose values are numbers, texts or arrays",
     )

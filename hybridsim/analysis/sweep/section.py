@@ -97,7 +97,7 @@ def sampling_period(model: Model) -> float:
     period = system_period(system_of(model))
     if period is None:
         raise UsageError(
-            f"model {model.name} has no forcing of one period",
+            f"model {model.name} has no single forcing period",
             remedy="set `section` to an expression that passes zero upward, such as 'v'",
         )
     return period

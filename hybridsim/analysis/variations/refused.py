@@ -17,7 +17,7 @@ def refuse(solution: Solution) -> None:
     """Reject runs of which derivatives cannot be computed."""
     if solution._save != "all":
         raise UsageError(
-            f"the run was made with keep={solution._save!r}, but derivatives need all of the run",
+            f"the run was made with keep={solution._save!r}, but derivatives need the whole run",
             remedy="repeat the run with keep='all'",
         )
     if solution.t_end <= solution.t_start:

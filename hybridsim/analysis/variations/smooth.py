@@ -106,8 +106,8 @@ def divided(slopes: NumberedSlopes, steps: Steps, fastest: float) -> tuple[Steps
     for one in np.flatnonzero((turns > _FADES * counts + _MAX_RADIANS) & ~stiff):
         here = number == one
         raise UsageError(
-            f"derivatives between t = {begins[here].min():.9g} and {ends[here].max():.9g} (since the last event) turn "
-            f"by about {turns[one]:.1g} radians: the computation takes minutes or longer",
+            f"the derivatives oscillate through about {turns[one]:.1g} radians between t = {begins[here].min():.9g} "
+            f"(the last event) and {ends[here].max():.9g}, so their computation would take minutes or longer",
             remedy="simulate a shorter time, or choose parameters for which the motion is slower",
         )
     regular = ~stiff[number]

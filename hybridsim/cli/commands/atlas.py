@@ -53,7 +53,9 @@ def add_to(commands: Any) -> None:
 def execute(args: argparse.Namespace, session: Session) -> int:
     """Run the scenes, print a table of counts and write the results."""
     if args.scenes and args.trouble:
-        raise UsageError("Names of scenes and --class cannot be combined", remedy="use only one of them")
+        raise UsageError(
+            "Names of scenes and --class cannot be combined", remedy="remove --class or the names"
+        )
     from hybridsim.testing.atlas import atlas, described, listing, scenes_named
 
     scenes = scenes_named(args.scenes, args.trouble)

@@ -17,7 +17,9 @@ def add_to(commands: Any) -> None:
         description="Print what a status or a warning means, and what to do.",
         epilog="Without WORDS the command lists all statuses and the phrases by which it finds warnings.",
     )
-    parser.add_argument("message", metavar="WORDS", nargs="*", help="a status, or a warning or a part of it")
+    parser.add_argument(
+        "message", metavar="WORDS", nargs="*", help="a status, a warning, or a part of a warning"
+    )
     parser.set_defaults(execute=execute)
 
 

@@ -250,7 +250,7 @@ class MechanicalSystem:
                     math.nan if (n := as_real(term)) is None else n
                 ):
                     raise UsageError(
-                        f"{self.name}: `forcing` of coordinate {i} holds {term!r}",
+                        f"{self.name}: `forcing` of coordinate {i} contains {term!r}",
                         remedy="use numbers and hs.Harmonic(omega, ...); write other forcing in an hs.Model",
                     )
             nonzero = tuple(t if isinstance(t, Harmonic) else float(t) for t in terms if t != 0.0)
@@ -285,7 +285,7 @@ class MechanicalSystem:
             for i, _ in contact.direction:
                 if not 0 <= i < self.n:
                     raise UsageError(
-                        f"{what} {contact.name}: its direction has the coordinate {i}, but there are {self.n}",
+                        f"{what} {contact.name}: its direction has coordinate {i}, but there are {self.n} coordinates",
                         remedy="number the coordinates from 0",
                     )
 

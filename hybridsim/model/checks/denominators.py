@@ -46,7 +46,7 @@ class Denominator:
 
 
 def denominators(model: Model) -> tuple[Denominator, ...]:
-    """Return denominators in rates, if they depend on states, parameters and t only and may change their sign.
+    """Return the denominators in rates that depend only on states, parameters and t, and may change their sign.
 
     Denominators inside a condition are omitted, because the condition may exclude the zero. Denominators that are never
     negative by their form are omitted too.

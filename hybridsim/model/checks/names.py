@@ -73,7 +73,7 @@ def _events(scope: Scope, seen: Mapping[str, str]) -> None:
 
 
 def check_identifier(scope: Scope, part: Declared, kind: str, name: object) -> bool:
-    """Return whether a name can be used in expressions, and report the name if not."""
+    """Return whether a name can be used in expressions, and report an invalid name."""
     segments = name.split(".") if isinstance(name, str) else []
     good = isinstance(name, str) and name.isascii() and is_name(name)
     if not good or any(word.startswith("__") for word in segments):

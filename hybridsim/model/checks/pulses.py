@@ -12,7 +12,7 @@ _CURVED = 9
 
 
 def pulse_in(node: ast.expr, lookup: Lookup) -> ast.expr | None:
-    """Return the first part that is a pulse or smooth step in t, or None.
+    """Return the first part of an expression that is a pulse or smooth step in t, or None.
 
     Pulses and steps are exp(p(t)), 1/p(t) and negative powers of p(t) for p of degree 2 or more, and tanh and atan of
     t. Polynomials in t, sines and cosines are not. Conditions on t are located, or reported as jumps.

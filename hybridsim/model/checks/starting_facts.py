@@ -17,7 +17,7 @@ _ULP = 2.0**-52  # relative spacing of doubles: the uncertainty of a start value
 
 
 def starting_facts(model: Model) -> tuple[str, ...]:
-    """Return a sentence for each guard, surface or gap that is zero at the start, and each vanishing load."""
+    """Return a sentence for each guard, surface or gap that is zero at the start, and for each vanishing load."""
     if model.flow is not None:
         return ()
     meanings = Meanings(model)

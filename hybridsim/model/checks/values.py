@@ -36,7 +36,7 @@ class _Check(NamedTuple):
 
 
 def errors_of_numbers(model: Model, changed: frozenset[str]) -> tuple[ModelError, ...]:
-    """Return the errors of a copy of a valid model that differs in the values of some parameters."""
+    """Return the errors of a copy of a valid model, in which some parameters have other values."""
     findings, checks = Findings(model), _checks_of(model)
     affected = [check for check in checks if not changed.isdisjoint(check.names)]
     if affected:
@@ -242,7 +242,7 @@ def _slip_at_points(findings: Findings, contact: Contact, values: dict[str, floa
 
 
 def _columns_of_tables(contact: Contact) -> list[tuple[str, dict[str, float]]]:
-    """Return the row variables at each number of the second argument of a table, with a description of the place."""
+    """Return the variables of a table's row at each number of the second argument, with a description of the place."""
     found: list[tuple[str, dict[str, float]]] = []
     for table in contact.law.tables:
         if table.across is not None:

@@ -134,7 +134,7 @@ class _Forms:
         return Component(element.name, (mode,), place=place)
 
     def _strides(self, element: Element, whole: str, sign: str) -> Iterator[Choice]:
-        """Yield the choices of a quantizer, from the largest stride to a single step."""
+        """Yield the choices of a quantizer, from the largest change to a change by one step."""
         for stride in _STRIDES:
             when = f"{sign}(input - whole*step) >= {stride - 0.5}*step"
             yield Choice("on", _form(element, when, whole=whole), {whole: parse_reset(f"+= {sign}{stride}")})
@@ -145,7 +145,7 @@ class _Forms:
         return name
 
     def _rate(self, element: Element) -> Expression:
-        """Return the rate of the input of a backlash, which must not jump."""
+        """Return the rate of a backlash's input; raise an error if the input or its rate jumps."""
         what = f"element {element.name}: the input"
         jumping = _jumping(self.model)
         for name in sorted(inlined(element.input, dict(self.definitions)).names):
@@ -167,7 +167,7 @@ class _Forms:
             raise element.error(f"element {element.name}: the delay is not known", remedy)
 
     def _queue(self, element: Element, clock: str, ticks: int) -> None:
-        """Add a queue of discrete states, which moves on at each tick of a schedule."""
+        """Add discrete states that store the last samples, which each tick of a schedule shifts by one state."""
         schedules = {schedule.name: k for k, schedule in enumerate(self.schedules)}
         if clock not in schedules:
             message = f"element {element.name}: unknown clock '{clock}'"
@@ -181,7 +181,7 @@ class _Forms:
         self.schedules[schedules[clock]] = replace(known, reset={**known.reset, **moved})
 
     def _shifted_input(self, element: Element, time: Expression) -> None:
-        """Add a copy of a table or wave that is later by the delay."""
+        """Add a copy of a table or wave, delayed by a given time."""
         what = f"element {element.name}"
         signal = next((one for one in self.inputs if one.name == element.input.text), None)
         if signal is None or signal.kind not in ("table", "wave"):

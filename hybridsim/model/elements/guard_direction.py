@@ -23,7 +23,7 @@ Definition = tuple[str, Expression]
 
 
 def without_directions(components: Iterable[Component], definitions: Iterable[Definition]) -> dict[str, Any]:
-    """Return components whose guards have no direction, and the definitions, including those for these guards.
+    """Return the components without directions of guards, and all definitions, including the added definitions.
 
     Each component is followed by the automata of its guards.
     """
@@ -61,7 +61,7 @@ def _refuse(component: Component, guard: Guard, direction: str) -> None:
 
 
 def _word(label: str) -> str:
-    """Return a label as part of a name."""
+    """Return a label with only characters that names may contain."""
     return re.sub(r"\W", "_", label)
 
 

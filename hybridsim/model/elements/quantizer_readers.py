@@ -35,7 +35,7 @@ def refuse_readers(model: Any, parts: Mapping[str, Any], quantizers: Mapping[str
             raise expr.error(
                 f"{what} reads the quantizer '{name}', which may still have an old value at an event",
                 remedy=f"compare its input '{quantizers[name].input.text}' with the borders instead; for a sampled "
-                "value let an element of kind 'delay' with `ticks = 1` take the sample, and quantize this element",
+                "value, quantize the output of an element of kind 'delay' with `ticks = 1`",
             )
 
 

@@ -158,7 +158,7 @@ class _Joined(ast.NodeTransformer):
         return ast.copy_location(ast.Name(f"[{len(self.found) - 1}]", ast.Load()), node)
 
     def visit_Subscript(self, node: ast.Subscript) -> ast.expr:
-        """Reject a subscript that no quantity follows."""
+        """Reject a subscript without a quantity after it."""
         message = f"'{ast.unparse(node)}' is a part and has no value"
         raise ExpressionError(message, place=self._at(node), remedy=_FORM)
 

@@ -183,7 +183,7 @@ class LawTable(Declared):
 
     @property
     def is_at_rest(self) -> bool:
-        """Whether the table has a value in stick: its argument is the speed itself, or no argument contains it."""
+        """Whether the table has a value in stick: its argument is the speed, or no argument contains the speed."""
         first, *second = self.arguments()
         return (self.over.text == "v" or "v" not in first) and not any("v" in names for names in second)
 
@@ -216,7 +216,7 @@ class LawTable(Declared):
 def _automaton(
     name: str, pieces: dict[str, list[str]], at: Sequence[float], argument: Expression, place: Place | None
 ) -> Corner:
-    """Return the automaton that sets some variables to functions of the argument `a`, which change at points."""
+    """Return the automaton that sets variables to piecewise functions of the argument `a`, with one mode per piece."""
     count = len(next(iter(pieces.values())))
     ends, modes = at[len(at) + 1 - count :], []
     for k in range(count):

@@ -41,7 +41,7 @@ def value(at: Sequence[float], values: Sequence[float], way: str, argument: floa
 
 
 def texts(at: Sequence[float], values: Sequence[float], way: str) -> list[str]:
-    """Return the function of the argument `a` below the first point, between the points, and above the last."""
+    """Return the function of the argument `a` below the first point, between the points, and above the last point."""
     found = [repr(values[0])]
     for x, *c in pieces(at, values, way):
         d = f"(a - ({x!r}))"

@@ -38,7 +38,7 @@ class Smoothed:
 
 
 def smoothed(model: Model) -> Model:
-    """Return the model with its corners and jumps as components, or the model itself without any."""
+    """Return the model with its corners and jumps as components, or the model itself if it has none."""
     if model.flow is not None:
         return model
     found: Model | None = model.once("smoothed", lambda: _smoothed(model))

@@ -16,7 +16,7 @@ from hybridsim.model.smoothing.rewriting_state import Here, RewritingState
 
 
 def jump_inside(work: RewritingState, node: ast.expr, here: Here) -> ast.expr | None:
-    """Return the argument of a jump in which a tree is nonlinear, or None if there is none.
+    """Return the argument of a jump on which a tree depends nonlinearly, or None if there is no such jump.
 
     Jumps that depend on time alone are excluded, because the modes or signals for them have only two values.
     """

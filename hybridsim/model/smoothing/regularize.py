@@ -209,7 +209,7 @@ def _holding_force(model: Model, contact: Contact) -> Expression:
     effect = slope(rate, contact.name)
     if contact.name in effect.names or effect.text == "0":
         raise ModelError(
-            f"contact {contact.name}: the rate of its velocity does not depend linearly on the force {contact.name}",
+            f"contact {contact.name}: the rate of the velocity does not depend linearly on the force {contact.name}",
             place=contact.place,
             remedy=f"add a term such as '- {contact.name}/m' to the rate",
         )

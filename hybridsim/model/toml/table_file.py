@@ -17,7 +17,7 @@ MAX_BYTES = 64_000_000
 def numbers_from_file(
     table: Table, folder: Path, keys: tuple[str, str], what: str
 ) -> dict[str, tuple[float, ...]]:
-    """Return the numbers of a table with the keys ``file`` and ``columns``, under the two given keys.
+    """Return, by the two given keys, the numbers of a table that has the keys ``file`` and ``columns``.
 
     Parameters
     ----------

@@ -45,7 +45,7 @@ def quantities_of(model: Model) -> Quantities | None:
 
 @dataclass(frozen=True)
 class _Use:
-    """An expression, and the source of its unit: the state of which it is the rate, a name, or a label."""
+    """An expression, and the source of its unit: a name, a label, or the state with this expression as its rate."""
 
     expr: Expression
     rate_of: str = ""
@@ -137,7 +137,7 @@ def _resets(model: Model) -> Iterator[Mapping[str, Expression]]:
 
 
 def _solved(known: Quantities, node: ast.expr, required: tuple[Unit, ...], name: str) -> Iterator[Unit]:
-    """Yield the units of a name for which an expression has one of the given units and the terms of sums agree."""
+    """Yield the units of a name that give an expression one of the given units, and all terms of a sum equal units."""
     match node:
         case ast.Name(id=own) if own == name:
             yield from required

@@ -48,7 +48,7 @@ def refuse_without_drawing(model: Model) -> None:
     if not model.drawing:
         raise UsageError(
             f"model {model.name} has no drawing",
-            remedy="add [drawing] to its file, or drawing=[hs.Shape(...)] to the model",
+            remedy="add [drawing] to the model file, or drawing=[hs.Shape(...)] to the hs.Model",
         )
 
 

@@ -197,7 +197,7 @@ class Pointwise(Node):
         if n:
             raise UsageError(
                 f"'{self.text}' is not smooth, but the multiple-precision run supports smooth modes only",
-                remedy="write its sides as modes with guards, or use reference='runs'",
+                remedy="write both sides of the expression as modes with guards, or use reference='runs'",
             )
         self.c.append(self.function(*(node.c[0] for node in self.operands)))
 

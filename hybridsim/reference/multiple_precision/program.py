@@ -167,7 +167,7 @@ class Program:
             if max(map(abs, self._surface_rates(0))) > size * self.context.mpf(10) ** -_LINEAR:
                 names = ", ".join(self.holding.names)
                 raise UsageError(
-                    f"the rates are not linear in {names}", remedy="let each force enter the rates linearly"
+                    f"the rates are not linear in {names}", remedy="write rates that are linear in each force"
                 )
 
     def _surface_rates(self, n: int) -> list[Number]:

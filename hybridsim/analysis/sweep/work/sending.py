@@ -150,5 +150,5 @@ def require_sendable(job: Job, cause: BaseException | None = None) -> None:
         except Exception as error:  # pickle raises any error of the object's own methods
             raise UsageError(
                 f"the {what} of the sweep cannot be sent to another process ({error})",
-                remedy="define its functions with def at the top of a module, or remove `executor`",
+                remedy="define functions with def at the top level of a module, or remove `executor`",
             ) from (cause or error)

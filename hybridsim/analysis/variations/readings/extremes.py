@@ -57,8 +57,8 @@ class Extremes:
         self._series = orbit.of(name) @ TO_COEFFICIENTS.T
         if not np.isfinite(orbit.of(name)[inside]).all():
             raise UsageError(
-                f"{name} has no finite value at some times, and so no readings",
-                remedy="use a part of the run, t_span=(a, b), on which it has values",
+                f"{name} is not finite at some times, so it has no readings",
+                remedy=f"use a part of the run, t_span=(a, b), in which {name} is finite",
             )
         self._first, self._last = self.limits = first, last
         self.size = float(np.abs(orbit.of(name)[inside]).max(initial=0.0))

@@ -120,8 +120,8 @@ class Readings:
                 times = " and ".join(f"t = {self._time(one):.9g}" for one in (points[0], place))
                 by = " and ".join(np.array(self._changes)[apart])
                 raise UsageError(
-                    f"the {kind} of {extremes.name} is at {times} with the same value {place.value:.9g}, and a change "
-                    f"of {by} moves the two values apart, so there is no derivative",
+                    f"{extremes.name} has the same {kind} {place.value:.9g} at {times}, and a change "
+                    f"of {by} makes the two values different, so there is no derivative",
                     remedy="use a part of the run with one of these times, t_span=(a, b)",
                 )
         return points[0].value, slopes[0] + 0.0 * slopes.sum(axis=0)  # NaN if it is NaN at one of the points
@@ -136,8 +136,8 @@ class Readings:
             if is_limit and shift.any():
                 by = " and ".join(np.array(self._changes)[shift != 0.0])
                 raise UsageError(
-                    f"{extremes.name} is largest or least at t = {self._time(place):.9g}, an end of the time span at "
-                    f"which an event happens, and a change of {by} moves the event, so there is no derivative",
+                    f"{extremes.name} is largest or least at an event at t = {self._time(place):.9g}, an end of the "
+                    f"time span; a change of {by} moves the event, so there is no derivative",
                     remedy="use a part of the run that ends earlier or later, t_span=(a, b)",
                 )
         return found.moving(extremes.name, place.number, place.s, is_after, shift)
@@ -194,8 +194,8 @@ class Readings:
             if t in (self._low, self._high):
                 by = " and ".join(np.array(self._changes)[shift != 0.0])
                 raise UsageError(
-                    f"the time span ends at t = {t:.9g}, at which {' * '.join(names)} jumps, and a change of {by} "
-                    "moves this time, so the integral has no derivative",
+                    f"{' * '.join(names)} jumps at t = {t:.9g}, an end of the time span; a change of {by} "
+                    "moves the jump, so the integral has no derivative",
                     remedy="use a part of the run that ends earlier or later, t_span=(a, b)",
                 )
             total += jump * shift
