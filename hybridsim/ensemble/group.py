@@ -41,7 +41,7 @@ class Group(NamedTuple):
 
 
 def can_run_together(system: System) -> bool:
-    """Return whether runs of a model can be computed together: it has only contacts and linear modes.
+    """Return whether runs of a model can be computed together: the model has only contacts and linear modes.
 
     Held values must be constants, because states that follow others are not supported here.
     """

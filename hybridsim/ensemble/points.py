@@ -1,4 +1,4 @@
-"""This module begins the run at a point of a group in compiled code, and summarises a part of it.
+"""This module begins the run at a point of a group in compiled code, and summarises a part of the run.
 
 The kernels of searches and of runs call both functions by address. Each function is compiled once.
 """
@@ -49,7 +49,7 @@ class Points(NamedTuple):
 
 
 class Fixed(NamedTuple):
-    """What all points of a system have in common."""
+    """The data that all points of a system have in common."""
 
     positions: np.ndarray  # positions (3,) of the origin, the phases and the pin in the run-time vector
     hold: np.ndarray  # holding mode (C,) of each component
@@ -63,7 +63,7 @@ class Fixed(NamedTuple):
 
 
 class PeriodSummary(NamedTuple):
-    """The measures of a period; with a leading axis, those of several points.
+    """The measures of a period of one point, or of several points if there is a leading axis.
 
     All but the last field are those of `hybridsim.engine.linear.motion_summary.MotionSummary`.
     """
@@ -132,7 +132,7 @@ def summarise(
 
 @inlined
 def set_start_errors(state: Any) -> None:
-    """Set the error bounds of states that are given as numbers, as `hybridsim.engine.events.start.start_errors`."""
+    """Set the error bounds of states that are given as numbers, as `engine.events.start.start_errors` does."""
     for j in range(state.x.shape[0]):
         x = state.x[j]
         state.x_error[j] = 0.0 if x == round(x) else 2.0 * UNIT * abs(x)

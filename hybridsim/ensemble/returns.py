@@ -42,7 +42,7 @@ def relative_change(before: Any, after: Any, scale: Any) -> float:
 
 @inline_always
 def repeats_after(states: Any, count: int, scale: Any, tol: float) -> int:
-    """Return after how many of the last passages the states (count, n) repeat, or 0."""
+    """Return the number of passages after which the last states (count, n) repeat, or 0."""
     last = count - 1
     for m in range(1, min(LONGEST_WORD, last) + 1):
         residual = relative_change(states[last - m], states[last], scale)
@@ -60,7 +60,7 @@ def repeats_after(states: Any, count: int, scale: Any, tol: float) -> int:
 
 @inline_always
 def nearest_return(states: Any, count: int, scale: Any) -> int:
-    """Return after how many of the last passages the states (count, n) come close to repeating."""
+    """Return the number of passages after which the last states (count, n) come close to repeating."""
     last, least = count - 1, math.inf
     most = max(1, min(LONGEST_WORD, last // 2))
     for m in range(1, most + 1):

@@ -97,7 +97,7 @@ class GroupScratch:
         )
 
     def link_search(self, searches: Any) -> None:
-        """Compile the kernel that searches a motion, unless it is compiled."""
+        """Compile the kernel of the search for a motion, if the kernel is not compiled yet."""
         if self._entry_points[SEARCH] == 0:
             self._entry_points[SEARCH] = kernel_address(
                 search_point, self.loop, self.fixed, searches, self.search, 0, 0.0, 0, 0

@@ -53,7 +53,7 @@ def suite_page(suite: SuiteComparison) -> tuple[Axes, ...]:
 
 
 def _headline(comparisons: Sequence[Comparison]) -> str:
-    """Return which method is the cheapest in the most scenes."""
+    """Return the number of scenes in which each method is the cheapest, as text."""
     from hybridsim.analysis.compare.table import TARGET, fastest
 
     firsts = Counter(row.label for one in comparisons if (row := fastest(one.rows)) is not None)

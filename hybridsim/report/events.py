@@ -54,7 +54,7 @@ def _long_text(kind: str, component: str, guard: str, source: str, target: str) 
 
 
 def _states(solution: Solution, events: list[Event]) -> list[dict[str, Any]] | None:
-    """Return each state just before and after the events; the second is None if no event changes the state."""
+    """Return each state just before and after the events; "after" is None if no event changes the state."""
     if not events or not solution.names:
         return None
     before = np.array([event.x_minus for event in events]).T
@@ -119,7 +119,7 @@ def modes_of(solution: Solution) -> list[dict[str, Any]]:
 
 
 def in_columns(ends: np.ndarray, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return fewer intervals: equal columns, each of which is divided among the modes that occur in the column.
+    """Return equal columns in place of many intervals; each column is divided among the modes that occur in it.
 
     ends (m, 2), numbers (m,) : the ends and modes of all intervals, ascending.
     """

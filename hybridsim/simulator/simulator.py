@@ -223,7 +223,7 @@ class Simulator(CurrentState):
 
     @refusing
     def set(self, inputs: Mapping[str, float]) -> tuple[Event, ...]:
-        """Set held inputs at the present time and return the events that this causes at once.
+        """Set held inputs at the present time and return the events that this change causes at once.
 
         A changed value is a further change at this instant: corners and modes are judged again with it. A value that
         is equal to the present one changes nothing.

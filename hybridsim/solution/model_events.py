@@ -37,7 +37,7 @@ class ModelEvents:
 
     @cached_property
     def event_positions(self) -> list[int]:
-        """Return for each event its index among the records, which include changes of side at corners."""
+        """Return the index of each event among all records, which include changes of side at corners."""
         return [k for k, occurrence in enumerate(self.occurrences) if occurrence.kind != "corner"]
 
     @cached_property

@@ -98,7 +98,7 @@ class Limits:
 
     @property
     def spent(self) -> str:
-        """The reason that is given for a computation that is skipped because no time is left."""
+        """The reason for a skipped computation, if no time was left."""
         return f"the budget of {self.budget.seconds:.3g} s is spent"
 
     def warm(self, ask: Callable[[Watch | None], Answer], watch: Watch) -> Answer:

@@ -289,7 +289,7 @@ def question_of(model: Model, quantity: Any, t_span: tuple[float, float] | None,
 
 
 def _name_and_number(text: str) -> tuple[str, str]:
-    """Split the name of a quantity, which may contain dots, from the number that may follow it."""
+    """Split a text into the name of a quantity, which may contain dots, and an optional number."""
     name, _, number = text.rpartition(".")
     return (name, number) if name and number.isdecimal() else (text, "")
 

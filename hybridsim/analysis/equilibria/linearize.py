@@ -243,7 +243,7 @@ def equilibrium_near(field: Field, x: np.ndarray) -> np.ndarray:
 def _without_dust(
     field: Field, x: np.ndarray, f: np.ndarray, A: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Set states that are zero within rounding to zero, unless that makes the rates worse."""
+    """Set states that are zero within rounding to zero, unless this change increases the rates."""
     scale = np.abs(A).max(axis=1, initial=0.0)
     scale[scale == 0.0] = 1.0
     for j in field.free:

@@ -235,7 +235,7 @@ class Residuals:
 
 
 def _central(one_sided: list[np.ndarray], is_coarse: bool) -> np.ndarray:
-    """Return the mean of the one-sided derivatives, or the smaller one if fine steps give very different values."""
+    """Return the mean of the one-sided derivatives, or the smaller one if the two differ much at fine steps."""
     one_sided = [each for each in one_sided if np.isfinite(each).all()] or [
         np.full_like(one_sided[0], np.nan)
     ]

@@ -1,4 +1,4 @@
-"""This package holds the simplified models of `advise`, each with a statement of the features that it leaves out."""
+"""This package contains the simplified models of `advise`, each with a statement of the features that it leaves out."""
 
 from __future__ import annotations
 

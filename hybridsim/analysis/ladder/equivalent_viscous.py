@@ -186,7 +186,7 @@ def _balanced(response: Response, forces: list[FirstHarmonic], c: np.ndarray) ->
 
 
 def _first(response: Response, forces: list[FirstHarmonic]) -> np.ndarray:
-    """Return a first estimate from the motion without friction, or with small damping if that motion is unbounded."""
+    """Return an estimate from the motion without friction or, if that motion is unbounded, with small damping."""
     try:
         found = _balanced(response, forces, np.zeros(len(forces)))
     except (np.linalg.LinAlgError, DoesNotApply):

@@ -92,7 +92,7 @@ def compare_laws(
 
 
 def contact_of(model: Model, contact: Any) -> str:
-    """Return the name of a contact of a model; None is the only one."""
+    """Return the name of a contact of a model; None selects the only contact."""
     names = [declared.name for declared in model.contacts]
     if contact is None:
         if len(names) != 1:

@@ -142,7 +142,7 @@ def _declared(model: Model, contact: str, entry: Any) -> tuple[str, Model, dict[
 
 
 def criterion(found: Fit, is_stated: bool) -> float:
-    """Return AICc of a fit, or infinity if there are too few samples; is_stated: whether the noise was given."""
+    """Return AICc of a fit, or infinity for too few samples; `is_stated` means that the noise was given."""
     n, count = found.samples, len(found.values)
     total = found.cost
     if not is_stated:

@@ -56,7 +56,7 @@ class LawFits(Readable):
 
     @property
     def weights(self) -> dict[str, float]:
-        """Akaike weight of each law: exp(-d/2), with the difference d to the least AICc, over the sum of all."""
+        """Akaike weight of each law: exp(-d/2), divided by the sum over all laws; d is AICc minus the least AICc."""
         least = min(row.aicc for row in self.rows)
         found = {
             row.label: math.exp(-0.5 * (row.aicc - least)) if row.aicc > least else 1.0 for row in self.rows

@@ -61,7 +61,7 @@ class OverRun(Measures):
         return self.solution.dissipated
 
     def stops(self, component: str) -> float:
-        """Return how often a component passes into its holding mode; holding from the start on is no stop."""
+        """Return how often a component changes to its holding mode; holding from the start does not count."""
         hold = self.held_mode(component)
         modes = [i.mode for i in self.solution.modes[component] if i.t1 > i.t0]
         return float(sum(before != hold == after for before, after in pairwise(modes)))
@@ -113,7 +113,7 @@ def _knots(orbit: Orbit) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _zero(series: np.ndarray, level: float, low: float, high: float, sign: float) -> float:
-    """Return where a Legendre series passes a level between two points, by bisection to the last bit."""
+    """Return the point at which a Legendre series passes a level between two points, by bisection."""
     for _ in range(_BISECTIONS):
         middle = 0.5 * (low + high)
         if not low < middle < high:

@@ -156,7 +156,7 @@ def bifurcation(
 
 
 def _refuse_unforced(job: Job, points: Sequence[Settings]) -> None:
-    """Raise the error of a missing period if the forcing has a period at none of the points."""
+    """Raise the error for a missing period if the forcing has no period at any point."""
     fault: UsageError | None = None
     for settings in points:
         try:

@@ -1,4 +1,4 @@
-"""This module selects the built-in measures by their names, and defines that of steady states."""
+"""This module selects the built-in measures by their names, and defines the measure of steady states."""
 
 from __future__ import annotations
 

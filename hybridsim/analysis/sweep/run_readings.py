@@ -46,7 +46,7 @@ class OfRun:
         return dict.fromkeys(self.reading_names, math.nan)
 
     def run(self, model: Model, previous: OverRun | None) -> OverRun:
-        """Return the run; with `warm_start`, it begins at the end of the previous one."""
+        """Return the run; with `warm_start`, the run begins at the end of the previous run."""
         arguments = dict(self.options)
         heads = {word.partition(".")[0] for word in self.reading_names}
         if heads == {FINAL}:
@@ -64,7 +64,7 @@ class OfRun:
 
     @cached_property
     def _quantities(self) -> tuple[str, ...]:
-        """The quantities of which the whole run is measured."""
+        """The quantities that are measured over the whole run."""
         passages = [p.quantity for word in self.reading_names if (p := passage_of(word))]
         parts = [word.partition(".") for word in self.reading_names]
         return tuple(dict.fromkeys([*passages, *(name for head, _, name in parts if head in OF_QUANTITY)]))

@@ -57,7 +57,7 @@ class Section:
     options: Mapping[str, Any]
 
     def run(self, model: Model, previous: Passings | None) -> Passings:
-        """Return the samples at one point; with `warm_start`, the run begins at the previous end."""
+        """Return the samples at one point; with `warm_start`, the run begins at the end of the previous run."""
         motion = Motion(model, dict(self.options), dict(self.first))
         start = None if previous is None else previous.end
         return self._passed(motion, start) if self.level else self._strobed(motion, start)

@@ -39,7 +39,7 @@ class OneSide:
         return _shift(self._carried, number)
 
     def own_sizes(self) -> np.ndarray:
-        """Return the length (M,) along each direction at which some quantity has changed by its own size."""
+        """Return the length of a change (M,) in each direction that changes some quantity by its own size."""
         found: np.ndarray = self._carrier.own_sizes(self._directions)
         return found
 
@@ -49,7 +49,7 @@ class OneSide:
 
 
 class BothSides(OneSide):
-    """Derivatives of a run, with NaN where the two sides of a guard or surface at zero differ.
+    """Derivatives of a run, with NaN if the derivatives on the two sides of a guard or surface at zero differ.
 
     Each direction that moves a function off its zero is carried forward and backward, on its own side.
     """
@@ -141,7 +141,7 @@ class BothSides(OneSide):
         return self._agreeing(sides, least, lost)
 
     def _agreeing(self, sides: np.ndarray, least: np.ndarray, lost: np.ndarray) -> np.ndarray:
-        """Return the derivatives at which forward and backward directions agree, and NaN elsewhere."""
+        """Return the derivatives that are equal in forward and backward directions, and NaN for all others."""
         count = len(self._chosen)
         one, other = sides[:, :count], -sides[:, count:]
         apart = np.abs(one - other) > _AGREE * (np.abs(one) + np.abs(other)) + least

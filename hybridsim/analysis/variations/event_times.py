@@ -123,7 +123,7 @@ class EventTimes:
         return Shift(-found.by / rate, found.sizes / abs(rate))
 
     def scheduled(self, one: Occurrence) -> list[np.ndarray]:
-        """Return the derivatives (M,) of a scheduled time, for each schedule that may have caused it."""
+        """Return the derivatives (M,) of a scheduled time, for each declared time that may have caused the event."""
         width = self._changes.G.shape[1]
         declared = next((c for c in self.system.model.schedules if c.name == one.component), None)
         if declared is None:

@@ -38,7 +38,7 @@ class OffZero(NamedTuple):
 
 
 def rates_of(system: System, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """Return the rates dx/dt (n,), where held states move along their constraints."""
+    """Return the rates dx/dt (n,); held states move along their constraints."""
     rates = system.flow(s, x, p, z)
     if not system.holds(z):
         return rates

@@ -105,7 +105,7 @@ class OverTime:
         return self._sides.shift(number)
 
     def own_sizes(self) -> np.ndarray:
-        """Return the length (M,) along each direction at which some quantity has changed by its own size."""
+        """Return the length of a change (M,) in each direction that changes some quantity by its own size."""
         return self._sides.own_sizes()
 
     def at_end(self) -> np.ndarray:

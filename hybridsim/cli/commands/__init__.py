@@ -1,1 +1,1 @@
-"""This folder holds the commands of the program, one module each, with options and action."""
+"""This package contains the commands of the program: one module for each command."""

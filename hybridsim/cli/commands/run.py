@@ -82,7 +82,7 @@ def execute(args: argparse.Namespace, session: Session) -> int:
 def simulated(
     model: Model, settings: dict[str, Any], args: argparse.Namespace, session: Session
 ) -> tuple[Solution, list[str]]:
-    """Return the solution of a run, possibly cut short, and the warnings that were printed before the run."""
+    """Return the solution of a run, even if interrupted, and the warnings that were printed before the run."""
     t_end = values.end_time(model, args.t_end)
 
     from hybridsim.integrators.registry import UnknownOption, integrator_class, option_names

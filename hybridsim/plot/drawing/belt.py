@@ -1,4 +1,4 @@
-"""This module draws a belt on two rollers, with marks that move with it."""
+"""This module draws a belt on two rollers, with marks that move with the belt."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""This module defines the lines and filled outlines of which shapes are drawn."""
+"""This module defines the lines and filled outlines that make up the drawn shapes."""
 
 from __future__ import annotations
 

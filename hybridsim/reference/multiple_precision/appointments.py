@@ -60,7 +60,7 @@ class Appointments:
 
 
 class _Clock:
-    """The times of one schedule, and how many times have passed."""
+    """The times of one schedule, and how many of these times have passed."""
 
     def __init__(self, schedule: Schedule, values: dict[str, float], precision: Precision) -> None:
         self._times = sorted(precision.number(evaluate(time, values)) for time in schedule.times)

@@ -80,7 +80,7 @@ class Holding:
         self._slopes = [[row[j] - rows[0][j] for row in rows[1:]] for j in range(len(self._surfaces))]
 
     def _choose_pins(self) -> list[int]:
-        """Choose for each surface a state to solve for, by elimination with the largest pivots."""
+        """Choose one unknown state for each surface, by elimination with the largest pivots."""
         moved = [any(effect[i] != 0 for effect in self._effects) for i in range(len(self._states))]
         rows = [
             [slope if moves else 0 * slope for slope, moves in zip(row, moved, strict=True)]

@@ -16,7 +16,7 @@ def scenes() -> tuple[Scene, ...]:
 
 
 def _twisting() -> Scene:
-    """Return the scene of a twisting motion, in which each half turn is sqrt(3) times shorter."""
+    """Return the scene of a twisting motion, in which each half turn is sqrt(3) times shorter than the last one."""
     half, end = 4 * math.sqrt(2) / 3, 4 * math.sqrt(2) / 3 / (1 - 1 / math.sqrt(3))
     first, second = half, half * (1 + 1 / math.sqrt(3))
 

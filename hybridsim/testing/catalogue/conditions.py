@@ -19,7 +19,7 @@ def _pulses() -> Scene:
 
 
 def _region() -> Scene:
-    """Return the scene of a condition on x = t - 1, y = t - 2 and x + y, which holds from t = 2 to 5.5."""
+    """Return the scene of a condition on x = t - 1, y = t - 2 and x + y, which is true from t = 2 to 5.5."""
     states = ((4.0, (3.0, 2.0, 2.0, 2.0)), (10.0, (9.0, 8.0, 3.5, 6.5)))
     return named("region", (0.0, 10.0), Truth(None, states), needs("sliding"))
 

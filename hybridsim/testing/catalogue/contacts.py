@@ -11,7 +11,7 @@ from hybridsim.testing.scene import Scene, Truth, named, needs
 
 
 def scenes() -> tuple[Scene, ...]:
-    """Return scenes of contacts with other laws, on a belt, and several at once."""
+    """Return scenes of contacts with other laws, of a contact on a belt, and of several contacts at once."""
 
     def belt(name: str, delta: float) -> Scene:
         events, states = recomputed(name)

@@ -55,7 +55,7 @@ def _saturation() -> Scene:
 
 
 def _drag() -> Scene:
-    """Return the scene of quadratic drag: v = vt tan upward, v = -vt tanh downward, vt: terminal speed."""
+    """Return the scene of quadratic drag: v = vt tan upward, v = -vt tanh downward, with terminal speed vt."""
     g, c, v0 = 9.81, 0.3, 5.0
     terminal = math.sqrt(g / c)
     rate = math.sqrt(g * c)

@@ -24,7 +24,7 @@ def scenes() -> tuple[Scene, ...]:
 
 
 def _doses() -> Scene:
-    """Return the scene of doses, of which several are due at one instant, and which decay as exp(-1.2 t)."""
+    """Return the scene of doses that decay as exp(-1.2 t); several doses are due at one instant."""
     doses = ((0.0, 100.0), (3.0, 50.0), (6.0, 200.0), (12.0, 100.0))
 
     def amount(t: float) -> tuple[float, ...]:

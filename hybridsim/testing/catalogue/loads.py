@@ -105,7 +105,7 @@ def _series() -> Scene:
 
 
 def _painleve() -> Scene:
-    """Return the scene of two admissible motions, which must both be named in the message of the run."""
+    """Return the scene of two admissible motions; the message of the run must name both motions."""
     return Scene(
         "painleve-start",
         "painleve",

@@ -25,7 +25,7 @@ def scenes() -> tuple[Scene, ...]:
 
 
 def _motion(t: float) -> tuple[float, float, float]:
-    """Return the position, the velocity and the drive of the exact motion."""
+    """Return the position, the velocity and the applied force of the exact motion."""
     drive = -PUSH + RISE * max(t - 3.0, 0.0)
     if t >= OFF:
         return RISE * (t - OFF) ** 3 / 6, RISE * (t - OFF) ** 2 / 2, drive

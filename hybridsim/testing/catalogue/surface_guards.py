@@ -9,7 +9,7 @@ from hybridsim.testing.scene import Scene, Truth, named, needs
 
 
 def scenes() -> tuple[Scene, ...]:
-    """Return scenes of guards that read speeds and gaps."""
+    """Return scenes of guards that depend on speeds and gaps."""
     return _speeds(), _gaps()
 
 

@@ -104,7 +104,7 @@ class Extremes:
         return float((sign * legendre.legval(low + (high - low) * _BETWEEN, self._series[k])).min())
 
     def _representative(self, group: list[Place], sign: int) -> Place:
-        """Return the best place of a group. A constant part or an end has an exact time, but a turn has not."""
+        """Return the best place of a group. A local extremum has no exact time, unlike constant parts and ends."""
         best = max(sign * place.value for place in group)
         near = [place for place in group if sign * place.value >= best - _SAME * self.size]
         return max(near, key=lambda place: (place.where == HELD, place.where != INSIDE, sign * place.value))
