@@ -118,7 +118,7 @@ def test_what_cannot_be_asked_for(given: dict[str, object], message: str) -> Non
 
 
 def test_no_period_says_what_to_do() -> None:
-    with pytest.raises(hs.UsageError, match="model circle has no forcing of one period") as caught:
+    with pytest.raises(hs.UsageError, match="model circle has no single forcing period") as caught:
         hs.bifurcation(CIRCLE, "r", [0.5, 1.0])
     assert "set `section` to" in str(caught.value)
 
@@ -129,7 +129,7 @@ def test_no_period_at_one_value_is_the_status_of_that_value() -> None:
         "driven", parameters={"w": 1.0}, states=[hs.State("x", 0.0, "sin(w*t) - x", nominal=1.0)]
     )
     found = hs.bifurcation(model, "w", [0.0, 1.0], settle=1, samples=1)
-    assert found.status[0].tolist()[1] == "ok" and "no forcing of one period" in found.status[0, 0]
+    assert found.status[0].tolist()[1] == "ok" and "no single forcing period" in found.status[0, 0]
 
 
 def test_frequency_response() -> None:
