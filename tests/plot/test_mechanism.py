@@ -177,7 +177,7 @@ def test_wrong_arguments_are_refused(
 def test_a_model_without_a_drawing_says_what_to_do(tmp_path: Path) -> None:
     bare = hs.simulate(hs.Model("bare", [hs.State("x", 1, "-x")]), (0, 1))
     for draw in (lambda: mechanism(bare, 0.5), lambda: bare.animate(tmp_path / "a.gif")):
-        with pytest.raises(hs.UsageError, match=r"bare has no drawing\nadd \[drawing\] to its file"):
+        with pytest.raises(hs.UsageError, match=r"bare has no drawing\nadd \[drawing\] to the model file"):
             draw()
 
 

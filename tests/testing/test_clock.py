@@ -60,7 +60,7 @@ def test_a_run_is_stopped_by_its_own_work_alone() -> None:
     time.sleep(0.2)
     watch(0.1)
     work(0.06)
-    with pytest.raises(LimitReached, match=r"0\.05 s allowed"):
+    with pytest.raises(LimitReached, match=r"0\.05 s are allowed"):
         watch(0.2)
 
 

@@ -368,7 +368,7 @@ DATA = {"t": [0.0, 1.0, 2.0], "x": [1.0, 1.5, 2.0]}
         ({"t": [0, 1], "x": [1, 2, 3]}, {"a": (0, 1)}, {}, "3 values, but there are 2 times"),
         ({"t": [0, 1], "x": [1, math.inf]}, {"a": (0, 1)}, {}, "infinite"),
         ({"t": [0, 1], "x": [1, "two"]}, {"a": (0, 1)}, {}, "not a number"),
-        ({"time": [0, 1], "x": [1, 2]}, {"a": (0, 1)}, {}, "no column 't', but time, x"),
+        ({"time": [0, 1], "x": [1, 2]}, {"a": (0, 1)}, {}, "no column 't'; the columns are: time, x"),
         ({"t": [0, 1]}, {"a": (0, 1)}, {}, "no measured quantity"),
         (hs.Record(DATA, params={"a": 1}), {"a": (0, 1)}, {}, "a record sets a"),
         (hs.Record(DATA, x0={"x": 1}), {"x(0)": (0, 1)}, {}, r"a record sets x\(0\)"),

@@ -227,7 +227,7 @@ def test_a_span_that_ends_at_an_event_is_refused() -> None:
     span = (0.0, float(found.times[0]))
     with pytest.raises(hs.UsageError, match=r"w is largest or least at .*change of the start of h"):
         found.of("minimum", "w", t_span=span)
-    with pytest.raises(hs.UsageError, match=r"at which w jumps, and a change of the start of h"):
+    with pytest.raises(hs.UsageError, match=r"w jumps at .*; a change of the start of h"):
         found.of("integral", "w", t_span=span)
     assert found.of("integral", "h", t_span=span).by_parameter[0] == pytest.approx(
         float(np.sqrt(2 / 9.8)), rel=EXACT
