@@ -1,4 +1,4 @@
-"""Find the messages of fatal guards; a run ends at the zero of such a guard, because no further mode is declared."""
+"""Find the messages of fatal guards, whose zeros end a run because no further mode is declared."""
 
 from __future__ import annotations
 

@@ -76,7 +76,7 @@ class MonitorSides:
         return due
 
     def _left(self, k: int, outcome: Outcome) -> int:
-        """Return the direction in which a monitor left its side, or 0 if the monitor stayed on it."""
+        """Return the direction in which a monitor left its side, or 0 if the monitor stayed on its side."""
         before, after = int(self.before[k]), int(outcome.monitor_sides[k])
         if after == before or (after == 0 and (self.is_open[k] or math.isnan(outcome.monitor_floors[k]))):
             return 0

@@ -24,7 +24,7 @@ dumps: Any = find_part("numba.core.serialize", "dumps", _AGAIN)
 
 
 def cache_on_disk(dispatcher: Any, function: Any) -> None:
-    """Make a numba function or C callback load its compiled code from the cache and store new code there."""
+    """Make a numba function or C callback load its compiled code from the cache, and store new code in the cache."""
     folder = kernel_folder()
     if folder is not None and None not in (CompileResultCacheImpl, FunctionCache, dumps):
         dispatcher._cache = KernelCache(function, folder)

@@ -105,7 +105,7 @@ class Trajectory:
             self.occurrences.drop(first)
 
     def mark(self, checkpoint: Made) -> None:
-        """Mark this point with a function that creates its checkpoint; a later mark replaces this one."""
+        """Mark this point of the run, with a function that creates its checkpoint; a later mark replaces this mark."""
         self._mark = (checkpoint, self.segments.mark(), self.occurrences.mark(), dict(self.warnings))
 
     def seal(self) -> None:

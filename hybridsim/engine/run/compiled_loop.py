@@ -122,7 +122,7 @@ class CompiledLoop:
         return other
 
     def renew(self) -> None:
-        """Allocate new arrays for later calls, because the trajectory keeps the former arrays."""
+        """Allocate new arrays for later calls, because the trajectory keeps the arrays of earlier calls."""
         self.used = (0, 0)  # used rows of steps, and of segments
         self.memory: tuple[np.ndarray, ...] | None = None
 

@@ -180,7 +180,7 @@ class Locator:
         )
 
     def is_clear(self, length: float, time: float) -> bool:
-        """Return whether no guard or monitor is near zero at the end of a step of this length."""
+        """Return whether no guard or monitor is near zero at the end of a step of a given length."""
         found = len(self.samples) == (len(self.numbers) > 0) + (len(self.monitor_numbers) > 0)
         clear = found and (length > _SHORT * time or not self.samples)
         for values in self.samples:

@@ -46,7 +46,7 @@ _NEAR = 1e-6  # relative to a time
 
 
 class ModeLoop:
-    """One run of a system with one stepping method; `compiled_loop` may have been called in advance."""
+    """One run of a system with one stepping method; `compiled_loop` may already have made the first call."""
 
     def __init__(
         self,

@@ -267,7 +267,7 @@ class SegmentRun:
         return self._at_step_end(step, found)
 
     def _start_again(self, step: Step) -> Step:
-        """Return a first step that is shorter than the given step. Some methods get its length from the tolerances."""
+        """Return a first step shorter than the given step; some methods compute its length from the tolerances."""
         self.refused = abs(step.s1)
         self.counters.rejected += 1
         self.last_step = SHORTER * self.refused

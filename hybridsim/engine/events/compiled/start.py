@@ -161,7 +161,7 @@ def _is_supported(system: System) -> bool:
 
 
 class StartScratch:
-    """The arrays of a call that judges modes without an event; `modes` lists the combinations with tapes."""
+    """The arrays of a call that judges modes without an event; `modes` lists combinations with instruction tapes."""
 
     def __init__(self, system: System) -> None:
         n, count, guards, whole = system.n, len(system.automata), system.guard_count, np.int64

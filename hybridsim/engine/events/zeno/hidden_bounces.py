@@ -104,7 +104,7 @@ def may_be_hidden(system: System, outcome: Outcome, happened: Sequence[Occurrenc
 
 
 def _barely_seen(system: System, outcome: Outcome, bounces: dict[int, Bounce]) -> dict[int, _Departure]:
-    """Return the departures after which flights are so short that rounding may hide the loss of speed."""
+    """Return the departures from zero after which flights are so short that rounding may hide the loss of speed."""
     found = {}
     for c, last in bounces.items() if system.has_tape else ():
         automaton = system.automata[c]
