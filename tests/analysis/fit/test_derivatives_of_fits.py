@@ -32,6 +32,21 @@ def x(k: mp.mpf, b: mp.mpf, x0: mp.mpf, t: float) -> mp.mpf:
     return b / k + (x0 - b / k) * mp.exp(-k * mp.mpf(t))
 
 
+@pytest.fixture
+def slow_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Replace the measured time of a run, so that exact derivatives cost less."""
+    add = DerivativeCosts.add_run
+    monkeypatch.setattr(DerivativeCosts, "add_run", lambda self, _: add(self, 100.0))
+
+
+@pytest.fixture
+def fast_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Replace the measured time of a run, so that differences cost less."""
+    add = DerivativeCosts.add_run
+    monkeypatch.setattr(DerivativeCosts, "add_run", lambda self, _: add(self, 1e-6))
+
+
+@pytest.mark.usefixtures("slow_runs")
 def test_slopes_of_samples_are_those_of_the_closed_form() -> None:
     """One sample is missing, one unknown varies as a logarithm, and one is a start."""
     model = decaying()
@@ -54,16 +69,15 @@ def test_slopes_of_samples_are_those_of_the_closed_form() -> None:
     assert found == pytest.approx(np.array(expected), rel=1e-10)
 
 
-def test_a_fit_with_exact_derivatives_finds_the_values(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The measured time of a run is replaced, so that exact derivatives cost less."""
-    add = DerivativeCosts.add_run
-    monkeypatch.setattr(DerivativeCosts, "add_run", lambda self, _: add(self, 1.0))
+@pytest.mark.usefixtures("slow_runs")
+def test_a_fit_with_exact_derivatives_finds_the_values() -> None:
     data = {"t": T, "x": [float(x(t=t, **{k: mp.mpf(v) for k, v in VALUES.items()})) for t in T]}
     found = hs.fit(decaying(), hs.Record(data, t0=0.0), UNKNOWNS | {"x(0)": hs.Unknown(0.0, 3.0, guess=1.0)})
     assert found.derivatives == "exact"
     assert list(found.values.values()) == pytest.approx([0.7, 1.6, 0.3], rel=1e-7)
 
 
+@pytest.mark.usefixtures("slow_runs")
 def test_a_run_without_derivative_gets_differences() -> None:
     """Python functions have no derivatives, and the fit says so."""
     model = hs.Model("m", states={"x": 1.6}, parameters={"k": 0.7, "b": 0.3}, flow=rate)
@@ -78,6 +92,7 @@ def rate(t: float, x: np.ndarray, p: object) -> tuple[float]:
     return (p.b - p.k * x[0],)
 
 
+@pytest.mark.usefixtures("fast_runs")
 def test_differences_of_a_run_with_many_events_take_less_time() -> None:
     t = np.linspace(0.0, 0.05, 40)
     data = {"t": t, "x": hs.simulate("dfcs", (0, 0.05)).output("x", t)}
