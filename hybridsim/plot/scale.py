@@ -59,9 +59,18 @@ def label_axis(
     heading, symbol = label_of(name, title)
     symbol = f"{symbol} [{text}]".strip() if text else symbol
     if isinstance(axis, YAxis) and heading:
-        heading = "\n".join(textwrap.wrap(heading, _ALONG_Y)) + "\n"
+        heading = "\n".join(_in_lines(heading)) + "\n"
     axis.set_label_text(f"{heading} {symbol}".replace("\n ", "\n").strip(), fontsize=9)
     axis.set_major_formatter(Scaled(10.0**power))
+
+
+def _in_lines(heading: str) -> list[str]:
+    """Return the lines of a title along a vertical axis; a last line of one or two letters gets one more word."""
+    lines = textwrap.wrap(heading, _ALONG_Y)
+    if len(lines) > 1 and len(lines[-1]) <= 2 and " " in lines[-2]:
+        before, _, word = lines[-2].rpartition(" ")
+        lines[-2:] = [before, f"{word} {lines[-1]}"]
+    return lines
 
 
 def shared_powers(quantities: Mapping[str, tuple[str, float, float]]) -> dict[str, int]:

@@ -112,7 +112,8 @@ def equilibria(
     if is_driven(system):
         raise UsageError(
             f"model {model.name} is forced in time: there is no equilibrium",
-            remedy="use hs.steady_state, or hs.linearize",
+            remedy="use hs.steady_state for a periodic forcing, hs.linearize to freeze the forcing at one time, or "
+            "give the model the final value of the forcing as a constant",
         )
     count = int(np.prod([len(a.modes) for a in system.automata]))
     if count > _MAX_COMBINATIONS:

@@ -13,6 +13,7 @@ import numpy as np
 
 from hybridsim import arguments
 from hybridsim.analysis.equilibria.field import Field, is_driven, modes_of
+from hybridsim.analysis.equilibria.zero_loads import zero_loads
 from hybridsim.calls import refusing
 from hybridsim.engine.system.system_cache import system_of
 from hybridsim.errors import SimulationError, UsageError
@@ -42,6 +43,8 @@ class Linearization(Readable):
         Whether all rates vanish there.
     admissible : bool
         Whether the modes can hold there: all their guards are >= 0.
+    warnings : tuple of str
+        Reasons to doubt the result, such as a normal load that is 0 at the time of the linearization.
 
     Examples
     --------
@@ -56,6 +59,7 @@ class Linearization(Readable):
     x: np.ndarray
     is_equilibrium: bool
     admissible: bool
+    warnings: tuple[str, ...] = ()
 
     def plot(self) -> Any:
         """Draw the eigenvalues in the complex plane, in rad per unit of t; see `hybridsim.plot.eigenvalues`.
@@ -73,6 +77,7 @@ class Linearization(Readable):
                 ", ".join([f"Linearization: {'stable' if self.stable else 'not stable'}", *remarks]),
                 f"  about x = {in_numbers(self.x)}; free states {', '.join(self.states) or 'none'}",
                 f"  eigenvalues {in_numbers(self.eigenvalues)}",
+                *(f"  warning: {text}" for text in self.warnings),
             ]
         )
 
@@ -182,6 +187,7 @@ def linearize(
         x,
         bool((np.abs(f) <= _CLOSED * _terms(A, field.sizes(x))).all()),
         bool((g >= 0.0).all()),
+        zero_loads(system, field.t, x),
     )
 
 

@@ -446,7 +446,9 @@ def _refuse_what_ends(system: System, has_period: bool) -> None:
         if declared.period is None:
             raise UsageError(
                 f"model {model.name} is driven by {declared.subject}, a {declared.kind}: there is no steady state",
-                remedy="use a periodic input",
+                remedy="use a periodic input, or replace the step by its final value"
+                if declared.kind == "step"
+                else "use a periodic input, or replace the input by its final value",
             )
     for clock in model.schedules:
         if clock.period is None or clock.count is not None:

@@ -12,7 +12,7 @@ from hybridsim.analysis.sweep.result import Sweep
 from hybridsim.analysis.sweep.sweep import sweep
 from hybridsim.arguments import cannot_be, text
 from hybridsim.calls import refusing
-from hybridsim.errors import UsageError
+from hybridsim.errors import UsageError, nearest
 from hybridsim.mechanics.declaration.system import MechanicalSystem
 from hybridsim.model import Model
 
@@ -63,6 +63,13 @@ def frequency_response(
     others, frequency = mapping(levels, "levels"), text(frequency, "frequency")
     if len(others) > 1 or frequency in others:
         raise cannot_be("levels", levels, "use one parameter other than the frequency")
+    known = [part.name for part in (*swept.parameters, *swept.states, *swept.discrete)]
+    if frequency not in known:
+        raise UsageError(
+            f"model {swept.name} has no parameter {frequency!r} to sweep over as the frequency",
+            remedy="pass `frequency`, the name of the parameter with the angular frequency of the forcing; "
+            + nearest(frequency, [parameter.name for parameter in swept.parameters], kind="parameters"),
+        )
     if not swept.states:
         raise UsageError(f"model {swept.name} has no states", remedy="use a model with at least one state")
     readings = [f"amplitude.{swept.states[0].name if quantity is None else text(quantity, 'quantity')}"]
