@@ -39,3 +39,28 @@ def test_one_block_is_the_scene_belt() -> None:
     sol = hs.simulate(hs.chain_on_belt(1, coupling=0.0), (0, 50))
     released = [e.t for e in sol.events if e.source == "stick"]
     assert np.diff(released) == pytest.approx(12.0010313, abs=1e-6)
+
+
+def test_the_texts_of_the_model_have_no_empty_signs() -> None:
+    system = hs.MechanicalSystem(
+        [2, 1],
+        None,
+        [[30, -15], [-15, 15]],
+        forcing=[hs.Harmonic(omega=3, sin=4, cos=-2), -5.0],
+        contacts=[
+            hs.MechanicalContact("f1", [1, 0], 10, "coulomb", {"mu": 0.3}, base=0.5),
+            hs.MechanicalContact("f2", [-1, 0.5], 10, "coulomb", {"mu": 0.3}),
+        ],
+        impacts=[hs.MechanicalImpact("p", [0, -1], gap=-0.25, restitution=0.5)],
+    )
+    model = system.to_model()
+    rates = [state.der.text for state in model.states]
+    assert rates == [
+        "v1",
+        "0.5*(4*sin(omega_1*t) - 2*cos(omega_1*t)) - 15*q1 + 7.5*q2 - 0.5*f1 + 0.5*f2",
+        "v2",
+        "-5 + 15*q1 - 15*q2 - 0.5*f2 - p",
+    ]
+    assert [contact.velocity.text for contact in model.contacts] == ["v1 - 0.5", "-v1 + 0.5*v2"]
+    assert model.impacts[0].gap.text == "-q2 - 0.25"
+    assert hs.MechanicalSystem([1.0], None, [0.0]).to_model().states[1].der.text == "0"
