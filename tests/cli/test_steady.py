@@ -50,3 +50,32 @@ def test_a_motion_without_multipliers_is_printed_all_the_same(tmp_path: Path, hy
     record = json.loads(out)
     assert code == 0 and record["multipliers"] is None and record["stable"] is None
     assert "happen at different times" in record["no_multipliers"]
+
+
+PAD = """schema = 1
+name = "pad"
+[states]
+x = { start = 0, der = "v", unit = "m", nominal = 1e-3 }
+v = { start = 0, der = "-1e5*x - 50*v - f", unit = "m/s", nominal = 1 }
+[contacts.f]
+velocity = "v - 2"
+normal = 2000
+law = { name = "measured" }
+[laws.measured]
+slip = "mu*N"
+stick = "mu*N"
+tables.mu = { at = [0, 1, 3, 5], values = [0.5, 0.4, 0.3, 0.28] }
+"""
+
+
+def test_units_are_printed_and_variables_of_tables_are_not(tmp_path: Path, hybridsim: Callable) -> None:
+    (tmp_path / "pad.toml").write_text(PAD)
+    code, out, err = hybridsim("steady", tmp_path / "pad.toml")
+    assert code == 0, err
+    rows = [line.split() for line in out.splitlines() if line]
+    assert {tuple(row[:2]) for row in rows} >= {("x", "[m]"), ("v", "[m/s]")}
+    assert next(row for row in rows if row[0] == "period")[2] == "s"
+    assert next(row for row in rows if row[:2] == ["x", "[m]"])[-1] == "m^2*s"
+    assert next(row for row in rows if row[:2] == ["v", "[m/s]"])[-1] == "(m/s)^2*s"
+    assert not {"f_v", "f_mu"} & {row[0] for row in rows}
+    assert "f_mu" not in out

@@ -91,3 +91,11 @@ def test_a_title_replaces_a_name_that_is_no_symbol() -> None:
 )
 def test_units_have_raised_exponents(unit: str, text: str) -> None:
     assert unit_text(unit) == text
+
+
+def test_a_vertical_title_has_no_last_line_of_one_letter() -> None:
+    axes = Figure().subplots()
+    label_axis(axes.yaxis, "stops per period of f", "", 0, 2, title="stops per period of f")
+    assert axes.get_ylabel().strip() == "stops per period\nof f"
+    label_axis(axes.yaxis, "amplitude of x", "", 0, 2, title="amplitude of x")
+    assert axes.get_ylabel().strip() == "amplitude of x"

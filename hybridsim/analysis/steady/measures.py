@@ -267,10 +267,12 @@ class Measures:
     def grazing(self) -> Grazing | None:
         """The guard that comes closest to zero without reaching it, or None if there is no such guard.
 
-        A guard at an event that makes it zero is left out there. So is a guard that varies too fast for its
-        minima to be found.
+        A guard at an event that makes it zero is left out there. So are points of tables, and a guard that varies
+        too fast for its minima to be found.
         """
         orbit, solution = self._orbit, self.solution
+        tables = {name for contact in solution.model.contacts for name in contact.table_variables}
+        system = solution._system
         guards = [name for name in orbit.names if name.startswith("guard ")]
         largest = {name: abs(orbit.of(name)).max() for name in guards if name not in orbit.too_fast}
         found: list[Grazing] = []
@@ -280,8 +282,8 @@ class Measures:
                 continue
             z = solution._segments[int(orbit.segments[piece])].z
             guard = int(name.removeprefix("guard "))
-            if solution._system.active(z)[guard]:
-                title = solution._system.guard_title(guard, z)
+            if system.active(z)[guard] and system.automata[system.owner[guard]].name not in tables:
+                title = system.guard_title(guard, z)
                 relative = float(value / largest[name])
                 found.append(Grazing(title, solution.t_start + float(t), float(value), relative))
         return min(found, key=lambda g: g.relative, default=None)

@@ -99,14 +99,15 @@ def execute(args: argparse.Namespace, session: Session) -> int:
 
 
 def _summary(found: SteadyState, record: dict[str, Any]) -> list[str]:
+    from hybridsim.model.checks.units import time_unit
+
     model = found.model
     lines = [f"{model.name}: {model.title}" if model.title else model.name, f"  {found.message}"]
     if not found.success:
         return lines
     if found.kind == "periodic":
-        lines.append(
-            f"  period       {found.period:.12g}" + (f" (x {found.multiple})" if found.multiple > 1 else "")
-        )
+        repeats = f" (x {found.multiple})" if found.multiple > 1 else ""
+        lines.append(f"  period       {found.period:.12g} {time_unit(model)}".rstrip() + repeats)
     lines.append(f"  modes        {' '.join(found.word)}")
     rubbing = {contact.name for contact in model.contacts}
     for name, share in record["stick_fraction"].items():
@@ -126,18 +127,46 @@ def _summary(found: SteadyState, record: dict[str, Any]) -> list[str]:
     if found.grazing is not None:
         near = found.grazing
         lines.append(f"  near grazing {near.guard}: minimum is {near.relative:.3g} of its maximum")
+    return [*lines, *_tables(found, record)]
+
+
+def _tables(found: SteadyState, record: dict[str, Any]) -> list[str]:
+    """Return the tables of measures and harmonics, without the variables of tables of friction laws."""
+    from hybridsim.model.checks.units import time_unit, units_of
+
+    model = found.model
+    units, time = units_of(model), time_unit(model)
+    made = {name for c in model.contacts for name in (*c.table_variables, c.table_speed)}
+    made -= {output.name for output in model.outputs}
+    labels = {
+        name: f"{name} [{units[name]}]" if units.get(name) else name
+        for name in record["amplitude"]
+        if name not in made
+    }
     header: tuple[str, ...] = ("quantity", "amplitude", "min", "max", "mean", "energy")
     rows = [
-        (name, *(f"{record[key][name]:.6g}" for key in ("amplitude", "minimum", "maximum", "mean", "energy")))
-        for name in record["amplitude"]
+        (
+            label,
+            *(f"{record[key][name]:.6g}" for key in ("amplitude", "minimum", "maximum", "mean")),
+            f"{record['energy'][name]:.6g} {_unit_of_energy(units.get(name, ''), time)}".rstrip(),
+        )
+        for name, label in labels.items()
     ]
-    lines += ["", *aligned([header, *rows], indent="  ")]
+    lines = ["", *aligned([header, *rows], indent="  ")]
     lines += [f"  {name}: varies too fast to be measured" for name in record["too_fast"]]
     count = len(next(iter(record["harmonics"].values()), [])) - 1
     if count > 0 and found.kind == "periodic":
         header = ("harmonic", *(str(k) for k in range(1, count + 1)))
         rows = [
-            (name, *(f"{h['amplitude']:.4g}" for h in row[1:])) for name, row in record["harmonics"].items()
+            (label, *(f"{h['amplitude']:.4g}" for h in record["harmonics"][name][1:]))
+            for name, label in labels.items()
         ]
         lines += ["", *aligned([header, *rows], indent="  ")]
     return lines
+
+
+def _unit_of_energy(unit: str, time: str) -> str:
+    """Return the unit of the integral of a square over time, or an empty text if it is unknown."""
+    if not unit or not time:
+        return ""
+    return f"{unit}^2*{time}" if unit.isalpha() else f"({unit})^2*{time}"

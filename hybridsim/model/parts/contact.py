@@ -153,6 +153,11 @@ class Contact(Declared):
         return f"{self.name}_{name}"
 
     @property
+    def table_variables(self) -> tuple[str, ...]:
+        """The names of the variables with the values of the law's tables."""
+        return tuple(self.variable(table.name) for table in self.law.tables)
+
+    @property
     def table_speed(self) -> str | None:
         """The name of the variable that is the argument of tables of the speed, or None without tables."""
         asked = any(SPEED in names for table in self.law.tables for names in table.arguments())

@@ -28,7 +28,14 @@ def pad(normal: str) -> hs.Model:
 
 @pytest.mark.parametrize(
     "normal",
-    ["N0*min(t/tr, 1)", "N0*t/tr if t < tr else N0", "N0*ramp", "N0*table", "N0*abs(wave)", "N0*max(0, t - 1)"],
+    [
+        "N0*min(t/tr, 1)",
+        "N0*t/tr if t < tr else N0",
+        "N0*ramp",
+        "N0*table",
+        "N0*abs(wave)",
+        "N0*max(0, t - 1)",
+    ],
 )
 def test_a_load_that_is_still_zero_is_named(normal: str) -> None:
     found = hs.linearize(pad(normal), "slip-")

@@ -147,3 +147,13 @@ def test_frequency_response() -> None:
     assert len(found.plot(over="omega")) == 3
     with pytest.raises(hs.UsageError, match="other than the frequency"):
         hs.frequency_response("dfcs", frequencies, {"omega": loads})
+
+
+def test_a_frequency_with_another_name_is_an_argument() -> None:
+    model = hs.Model("forced", [hs.State("x", 0, "cos(w*t) - x")], parameters={"w": 1})
+    with pytest.raises(
+        hs.UsageError, match=r"no parameter 'omega'(.|\n)*pass `frequency`(.|\n)*known parameters: w"
+    ):
+        hs.frequency_response(model, [1, 2])
+    found = hs.frequency_response(model, [1, 2], frequency="w")
+    assert found["amplitude.x"] == pytest.approx([2**-0.5, 5**-0.5], rel=1e-6)  # 1/|1 + i w|
