@@ -45,7 +45,7 @@ def draw_orbit(
     colours = style.mode_colours(solution.components)
     surfaces = {c.name: c.surface.hold for c in solution.components if c.surface}
     held_modes = set(surfaces.values())
-    spans = [extent(smooth_parts, name) for name in (across, up)]
+    spans = [extent(np.concatenate([part.values[name] for part in smooth_parts])) for name in (across, up)]
     least = np.array([_VISIBLE * ((high - low) or 1.0) for low, high in spans])
     lines: dict[str, list[Points]] = {}
     dots: dict[str, list[Points]] = {}

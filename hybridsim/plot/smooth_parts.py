@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import bisect
+import itertools
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
@@ -19,9 +20,9 @@ from hybridsim.mechanics.declaration.system import Harmonic, MechanicalSystem
 from hybridsim.model.checks.units import units_of
 from hybridsim.solution import Solution
 
-# Points of a whole picture, about four per horizontal pixel, and the fewest per part, so that a short slip
-# among long ones remains a curve.
-_POINTS, _LEAST = 6_000, 9
+# Points of a whole picture, about four per horizontal pixel. Each part has at least 5 points, and at least 9 if the
+# picture then has no more than 60 000 points: a short slip among long ones remains a curve.
+_POINTS, _LEAST, _MOST_POINTS = 6_000, (5, 9), 60_000
 # If there are more periods than a picture can resolve, only the last few are drawn, without the transient.
 _MAX_PERIODS, _LAST_PERIODS = 24, 4
 CUTS = ("transition", "monitor", "scheduled")  # kinds of events at which a curve may jump or bend
@@ -40,6 +41,15 @@ class SmoothPart:
     t: NDArray[np.float64]
     values: Mapping[str, NDArray[np.float64]]
     modes: Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class Samples:
+    """The samples of all smooth parts of a window in order of time."""
+
+    t: NDArray[np.float64]  # (k,), an inner event time twice
+    values: Mapping[str, NDArray[np.float64]]  # (k,) of each quantity
+    firsts: NDArray[np.int64]  # (parts + 1,): the first sample of each part, and k
 
 
 @dataclass(frozen=True)
@@ -177,10 +187,9 @@ def unit_of(solution: Solution, name: str) -> str:
     return units.get(name, "")
 
 
-def extent(smooth_parts: Sequence[SmoothPart], name: str) -> tuple[float, float]:
+def extent(values: NDArray[np.float64]) -> tuple[float, float]:
     """Return the least and largest value of a quantity."""
-    values = [smooth_part.values[name] for smooth_part in smooth_parts]
-    return float(min(map(np.min, values))), float(max(map(np.max, values)))
+    return float(np.min(values)), float(np.max(values))
 
 
 def require_length(window: Window) -> None:
@@ -192,36 +201,52 @@ def require_length(window: Window) -> None:
         )
 
 
-def smooth_parts_of(solution: Solution, names: Sequence[str], window: Window) -> list[SmoothPart]:
-    """Return the smooth parts of a window in order of time, split at the events."""
+def samples_of(solution: Solution, names: Sequence[str], window: Window) -> Samples:
+    """Return the samples of a window, with both sides of each event, so that each smooth part has its own ends."""
     require_length(window)
     times = np.concatenate([event_times(solution, CUTS), _input_jumps(solution, window)])
-    inner = set(times[(times > window.t0) & (times < window.t1)].tolist())
-    cuts = np.array([window.t0, *sorted(inner), window.t1])
+    cuts = np.unique([window.t0, *times[(times > window.t0) & (times < window.t1)], window.t1])
     lengths = np.diff(cuts)
-    counts = np.maximum(_LEAST, np.ceil(_POINTS * lengths / lengths.sum())).astype(int)
-    grids = [np.linspace(a, b, count) for a, b, count in zip(cuts[:-1], cuts[1:], counts)]
-    forward = solution.t_end >= solution.t_start
-    starts, ends = ("+", "-") if forward else ("-", "+")
-    body = np.concatenate([grid[:-1] for grid in grids])
-    splits = np.cumsum(counts - 1)[:-1]
-    values: dict[str, list[NDArray[np.float64]]] = {}
-    for name in names:
-        parts = np.split(_evaluate(solution, name, body, starts), splits)
-        last = _evaluate(solution, name, cuts[1:], ends)
-        values[name] = [np.append(part, value) for part, value in zip(parts, last)]
-    modes_at = mode_lookup(solution)
+    least = np.clip(_MOST_POINTS // len(lengths), *_LEAST)
+    counts = np.maximum(least, np.ceil(_POINTS * lengths / lengths.sum())).astype(int)
+    firsts = np.concatenate([[0], np.cumsum(counts)])
+    steps = np.arange(firsts[-1]) - np.repeat(firsts[:-1], counts)
+    t = np.repeat(cuts[:-1], counts) + steps * np.repeat(lengths / (counts - 1), counts)
+    lasts = firsts[1:] - 1
+    t[lasts] = cuts[1:]
+    is_last = np.zeros(len(t), dtype=bool)
+    is_last[lasts] = True
+    starts, ends = ("+", "-") if solution.t_end >= solution.t_start else ("-", "+")
+    values = {name: np.empty(len(t)) for name in names}
+    for chosen, side in ((~is_last, starts), (is_last, ends)):
+        for name, found in _evaluate(solution, names, t[chosen], side).items():
+            values[name][chosen] = found
+    return Samples(t, values, firsts)
+
+
+def smooth_parts_of(solution: Solution, names: Sequence[str], window: Window) -> list[SmoothPart]:
+    """Return the smooth parts of a window in order of time, split at the events."""
+    samples, modes_at = samples_of(solution, names, window), mode_lookup(solution)
     return [
-        SmoothPart(grid, {name: values[name][i] for name in names}, modes_at((grid[0] + grid[-1]) / 2))
-        for i, grid in enumerate(grids)
+        SmoothPart(
+            samples.t[a:b],
+            {name: samples.values[name][a:b] for name in names},
+            modes_at((samples.t[a] + samples.t[b - 1]) / 2),
+        )
+        for a, b in itertools.pairwise(samples.firsts.tolist())
     ]
 
 
-def _evaluate(solution: Solution, name: str, t: NDArray[np.float64], side: str) -> NDArray[np.float64]:
-    for i, state in enumerate(getattr(solution.model, "states", ())):
-        if state.name == name:
-            return np.asarray(solution(t, side=side)[i])
-    return np.asarray(solution.output(name, t, side=side))
+def _evaluate(
+    solution: Solution, names: Sequence[str], t: NDArray[np.float64], side: str
+) -> dict[str, NDArray[np.float64]]:
+    """Return the values (k,) of quantities at times (k,); all states are evaluated together."""
+    states = [state.name for state in getattr(solution.model, "states", ())]
+    x = solution(t, side=side) if any(name in states for name in names) else np.zeros((0, len(t)))
+    return {
+        name: np.asarray(x[states.index(name)] if name in states else solution.output(name, t, side=side))
+        for name in names
+    }
 
 
 def mode_lookup(solution: Solution) -> Callable[[float], dict[str, str]]:

@@ -18,13 +18,13 @@ from hybridsim.plot import style
 from hybridsim.plot.scale import label_axis, shared_powers
 from hybridsim.plot.smooth_parts import (
     CUTS,
-    SmoothPart,
+    Samples,
     Window,
     event_times,
     extent,
     known_units,
     require_run,
-    smooth_parts_of,
+    samples_of,
     title_of,
     unit_of,
     window_of,
@@ -88,18 +88,18 @@ def time_history(
     names = list(dict.fromkeys(name for panel in panels for name in panel))
     units = {name: unit_of(solution, name) for name in names}
     window = window_of(solution, t_span)
-    smooth_parts = smooth_parts_of(solution, names, window)
+    samples = samples_of(solution, names, window)
     components = changing[:_MOST_COMPONENTS]
     taken = mode_colours_of(solution, components).values() if components else ()
     history = _axes(len(panels), len(components), axes)
     marks = _marks_in(solution, window)
-    extents = {name: extent(smooth_parts, name) for name in names}
+    extents = {name: extent(samples.values[name]) for name in names}
     powers = shared_powers({name: (units[name], *extents[name]) for name in names})
     above = 0.0
     for axis, panel in zip(history.quantities, panels, strict=True):
         looks = _looks(len(panel), taken)
         for name, (colour, dashes) in zip(panel, looks, strict=True):
-            _draw(axis, smooth_parts, name, colour, dashes)
+            _draw(axis, samples, name, colour, dashes)
         _mark(axis, marks)
         style.dress(axis)
         low, high = zip(*(extents[name] for name in panel), strict=True)
@@ -196,29 +196,29 @@ def _axes(quantities: int, components: int, axes: Sequence[Axes] | None) -> Time
     return TimeHistoryAxes(made[:quantities], made[quantities] if components else None)
 
 
-def _draw(axis: Axes, smooth_parts: Sequence[SmoothPart], name: str, colour: str, dashes: Any) -> None:
+def _draw(axis: Axes, samples: Samples, name: str, colour: str, dashes: Any) -> None:
     """Draw a curve as one line that is interrupted at jumps; the jumps are a second, dashed line."""
-    low, high = extent(smooth_parts, name)
-    t, y, jump_t, jump_y = [smooth_parts[0].t], [smooth_parts[0].values[name]], [], []
-    for before, after in itertools.pairwise(smooth_parts):
-        left, right = before.values[name][-1], after.values[name][0]
-        if abs(right - left) > _VISIBLE * (high - low):
-            t.append(np.array([np.nan]))
-            y.append(np.array([np.nan]))
-            jump_t += [after.t[0], after.t[0], np.nan]
-            jump_y += [left, right, np.nan]
-        t.append(after.t)
-        y.append(after.values[name])
+    t, y = samples.t, samples.values[name]
+    low, high = extent(y)
+    after = samples.firsts[1:-1]
+    after = after[np.abs(y[after] - y[after - 1]) > _VISIBLE * (high - low)]
     axis.plot(
-        np.concatenate(t),
-        np.concatenate(y),
+        np.insert(t, after, np.nan),
+        np.insert(y, after, np.nan),
         color=colour,
         linestyle=dashes,
         linewidth=1.2,
         solid_joinstyle="round",
     )
-    if jump_t:
-        axis.plot(jump_t, jump_y, color=colour, linewidth=0.8, linestyle=(0, (3, 2)))
+    if len(after):
+        gap = np.full(len(after), np.nan)
+        axis.plot(
+            np.column_stack([t[after], t[after], gap]).ravel(),
+            np.column_stack([y[after - 1], y[after], gap]).ravel(),
+            color=colour,
+            linewidth=0.8,
+            linestyle=(0, (3, 2)),
+        )
 
 
 def _mark(axis: Axes, marks: Mapping[str, np.ndarray]) -> None:

@@ -17,6 +17,7 @@ from hybridsim.solution.files.tabulated import at_steps, tabulated
 from hybridsim.solution.model_events import ModelEvents
 from hybridsim.solution.run import Run
 from hybridsim.solution.run_trajectory import relative_velocity
+from hybridsim.solution.segment_constants import SegmentConstants, constants_of
 
 if TYPE_CHECKING:
     from hybridsim.engine.record.block_list import SegmentBlockList
@@ -112,7 +113,7 @@ class ModelTrajectory(ModelEvents):
 
     def by_segment(
         self, times: np.ndarray, side: str
-    ) -> tuple[np.ndarray, list[tuple[Segment, np.ndarray, np.ndarray]]]:
+    ) -> tuple[np.ndarray, list[tuple[SegmentConstants, np.ndarray, np.ndarray]]]:
         """Return states (k, n) at given times, and for each segment the indices and local times of its given times."""
         index, s = self.segment_at(times, side)
         order = np.argsort(index, kind="stable")
@@ -120,7 +121,7 @@ class ModelTrajectory(ModelEvents):
         starts, blocks = self.segments.starts(), self.segments.blocks
         block = np.searchsorted(starts, found, side="right") - 1
         within = zip(block.tolist(), (found - starts[block]).tolist(), np.split(order, first[1:]))
-        by_segment = [(blocks[b][i], chosen, s[chosen]) for b, i, chosen in within]
+        by_segment = [(constants_of(blocks[b], i), chosen, s[chosen]) for b, i, chosen in within]
         return self.segments.states(index, s), by_segment
 
     # -- quantities -----------------------------------------------------------------------------------------
@@ -177,7 +178,7 @@ class ModelTrajectory(ModelEvents):
         return np.array([evaluate(contact.velocity, values) for values in here])
 
     def values_at(
-        self, names: Sequence[str], segment: Segment, s: np.ndarray, x: np.ndarray
+        self, names: Sequence[str], segment: Segment | SegmentConstants, s: np.ndarray, x: np.ndarray
     ) -> list[np.ndarray]:
         """Return the values of states and quantities at points of a segment."""
         system = self.system
@@ -190,7 +191,7 @@ class ModelTrajectory(ModelEvents):
         return [found[name] for name in names]
 
     def values_in(
-        self, names: Sequence[str], segment: Segment, s: np.ndarray, x: np.ndarray
+        self, names: Sequence[str], segment: Segment | SegmentConstants, s: np.ndarray, x: np.ndarray
     ) -> list[np.ndarray]:
         """Return the values of quantities other than continuous states, at points of a segment."""
         system = self.system
@@ -212,9 +213,10 @@ class ModelTrajectory(ModelEvents):
     def table(self, times: np.ndarray | None) -> Table:
         """Return states, quantities and modes at given times as columns."""
         if times is None:
-            t, x, parts = self.own_times, self.own_states.T, at_steps(self.segments)
+            parts: Sequence[Any] = at_steps(self.segments)
+            t, x = self.own_times, self.own_states.T
         else:
-            nothing: tuple[np.ndarray, list[Any]] = np.zeros((0, len(self.names))), []
+            nothing: tuple[np.ndarray, Sequence[Any]] = np.zeros((0, len(self.names))), []
             t, (x, parts) = times, self.by_segment(times, "+") if len(times) else nothing
         return tabulated(self.run, self.status, t, x, parts, self.values_in)
 
