@@ -36,6 +36,7 @@ from hybridsim.solution import Solution
 _MOST_QUANTITIES = 4  # the default number of quantities, and of outputs
 _MOST_COMPONENTS = 16  # rows of the strip of modes
 _MOST_MARKS = 150  # event lines; more would merge into a grey area
+_MOST_NAMES = 4  # monitors that a legend names
 _VISIBLE = 1e-3  # of the range: a smaller jump is invisible
 _OVERLAID = 3  # quantities of one unit that share a panel
 _ROW, _STRIP, _AROUND = 1.45, 0.3, 0.95  # inches
@@ -108,9 +109,15 @@ def time_history(
         label_axis(
             axis.yaxis, panel[0], unit, min(low), max(high), title=title_of(model, panel[0]), power=power
         )
-        if len(panel) > 1:
-            height = _name_curves(axis, model, panel, [units[name] for name in panel], looks)
-            above = height if axis is history.quantities[0] else above
+        is_top = axis is history.quantities[0]
+        handles = (
+            _name_curves(axis, model, panel, [units[name] for name in panel], looks) if len(panel) > 1 else []
+        )
+        if is_top and 0 < len(marks["monitor"]) <= _MOST_MARKS:
+            handles.append(_monitor_handle(solution, window))
+        if handles:
+            height = style.legend_above(axis, handles)
+            above = height if is_top else above
         axis.set_xlim(window.t0, window.t1)
     if history.modes is not None:
         draw_strip(history.modes, solution, components, window)
@@ -155,8 +162,8 @@ def _looks(count: int, taken: Collection[str]) -> list[tuple[str, Any]]:
 
 def _name_curves(
     axis: Axes, model: Any, panel: Sequence[str], units: Sequence[str], looks: Sequence[tuple[str, Any]]
-) -> float:
-    """Write the symbols of several curves above their panel, with the common part of their titles beside the symbols.
+) -> list[Line2D]:
+    """Return the entries of a legend of several curves, and write the common part of their titles beside the panel.
 
     The unit is beside the panel if all curves have the same, otherwise behind each symbol.
     """
@@ -170,7 +177,18 @@ def _name_curves(
     for name, unit, (colour, dashes) in zip(panel, units, looks, strict=True):
         behind = f" [{unit_text(unit)}]" if unit and not is_shared else ""
         handles.append(Line2D([], [], color=colour, linestyle=dashes, label=symbol_of(name) + behind))
-    return style.legend_above(axis, handles)
+    return handles
+
+
+def _monitor_handle(solution: Solution, window: Window) -> Line2D:
+    """Return the entry of a legend for the triangles of monitors, with the direction of each monitor."""
+    within = (e for e in solution.events if e.kind == "monitor" and window.t0 <= e.t <= window.t1)
+    names = list(dict.fromkeys(event.component for event in within))
+    directions = {one.name: one.direction for one in solution.model.monitors if one.direction != "both"}
+    texts = [f"{name} ({directions[name]})" if name in directions else name for name in names]
+    label = f"monitor{'s' if len(texts) > 1 else ''} {', '.join(texts[:_MOST_NAMES])}"
+    label += ", …" if len(texts) > _MOST_NAMES else ""
+    return Line2D([], [], color=style.INK, marker="v", markersize=5, linestyle="", label=style.literal(label))
 
 
 def _marks_in(solution: Solution, window: Window) -> dict[str, np.ndarray]:

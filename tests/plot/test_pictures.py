@@ -235,6 +235,30 @@ def test_monitors_are_marked() -> None:
     assert [line.get_xdata()[0] for line in marked] == [crossing.t]
 
 
+@pytest.mark.parametrize(
+    "direction, names, label",
+    [("up", ["x", "y"], "monitor half (up)"), ("both", [["x", "y"]], "monitor half")],
+)
+def test_the_triangles_of_monitors_are_named(direction: str, names: list, label: str) -> None:
+    """The legend of the uppermost panel names them, behind the curves if these are named there."""
+    states = [hs.State("x", 1, "y"), hs.State("y", 0, "-x")]
+    model = hs.Model("circle", states, monitors=[hs.Monitor("half", "x - 0.5", direction=direction)])
+    solution = hs.simulate(model, (0.0, 7.0))
+    history = time_history(solution, names)
+    legend = history.quantities[0].get_legend()
+    assert [text.get_text() for text in legend.get_texts()] == [
+        *(["x", "y"] if len(names) == 1 else []),
+        label,
+    ]
+    assert legend.legend_handles[-1].get_marker() == "v"
+    assert all(axes.get_legend() is None for axes in history.quantities[1:])
+    history.quantities[0].figure.draw_without_rendering()
+    title = next(text for text in history.quantities[0].findobj(Text) if text.get_text() == "circle")
+    assert not legend.get_window_extent().overlaps(title.get_window_extent())
+    before = time_history(solution, ["x"], t_span=(0.0, 1.0)).quantities[0]
+    assert before.get_legend() is None
+
+
 def test_phase_portrait_sets_stick_apart() -> None:
     axes = phase_portrait(oscillator(100))
     dots = [line for line in axes.get_lines() if line.get_marker() == "o"]
