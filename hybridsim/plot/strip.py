@@ -16,6 +16,9 @@ from hybridsim.solution import Solution
 
 _HAIRLINE = 1.2  # points: the least width of a mode in a strip
 _HEIGHT = 0.38  # half of a row that the bars take
+_ROWS = (
+    16  # pixels of the height of the bars on a page: the least height of a mode in a divided column is one
+)
 
 
 def changing_components(solution: Solution) -> list[str]:
@@ -41,7 +44,7 @@ def draw_strip(axis: Axes, solution: Solution, components: Sequence[str], window
     is_shared = False
     columns = _columns(axis)
     for row, component in enumerate(components):
-        bars, shares = bars_of(solution.modes[component], window.t0, window.t1, columns)
+        bars, shares = bars_of(solution.modes[component], window.t0, window.t1, columns, _ROWS)
         is_shared = is_shared or shares
         for mode in {bar.mode for bar in bars}:
             seen.setdefault(mode, []).append(component)
@@ -68,7 +71,7 @@ def draw_strip(axis: Axes, solution: Solution, components: Sequence[str], window
         whose = f" ({', '.join(seen[mode])})" if used.count(colours[mode]) > 1 else ""
         handles.append(Patch(color=colours[mode], label=style.literal(mode + whose)))
     if is_shared:
-        handles.append(Patch(alpha=0.0, label="(a divided column: several short modes)"))
+        handles.append(Patch(alpha=0.0, label="(a divided column: the share of each mode)"))
     style.legend_above(axis, handles)
 
 

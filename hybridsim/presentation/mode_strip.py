@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections import Counter, defaultdict
 from collections.abc import Sequence
+from itertools import accumulate, pairwise
 from typing import NamedTuple, Protocol
 
 _WIDE = 3  # columns: an interval of this width remains visible between two hairlines
@@ -29,26 +31,55 @@ class Bar(NamedTuple):
     mode: str
 
 
-def bars_of(intervals: Sequence[Interval], t0: float, t1: float, columns: int) -> tuple[list[Bar], bool]:
-    """Return the bars of a strip in the order of drawing, and whether any bars share a column.
+def bars_of(
+    intervals: Sequence[Interval], t0: float, t1: float, columns: int, rows: int
+) -> tuple[list[Bar], bool]:
+    """Return the bars of a strip in the order of drawing, and whether any columns are divided.
 
-    An interval that is narrower than three columns gets a whole column besides its own bar: a hairline. Where several
-    such intervals fall into one column, their modes share its height.
+    An interval that is narrower than three columns gets a whole column besides its own bar: a hairline. A column with
+    several such intervals is divided among its modes. The height of a mode is its share of the time of the column, but
+    at least one of the `rows` of pixels. From below, the modes are in the order in which they first occur.
     """
     width = (t1 - t0) / columns
-    wide, narrow = [], dict[int, dict[str, None]]()
+    order: dict[str, None] = {}
+    wide, narrow = [], Counter[int]()
+    times: dict[int, dict[str, float]] = defaultdict(lambda: defaultdict(float))
+    hairlines: dict[int, str] = {}
     for interval in intervals:
-        start, end = sorted((interval.t0, interval.t1))
-        start, end = max(start, t0), min(end, t1)
+        start, end = (min(max(t, t0), t1) for t in sorted((interval.t0, interval.t1)))
         if end <= start:
             continue
+        order[interval.mode] = None
         wide.append(Bar(start, end, 0.0, 1.0, interval.mode))
-        if end - start < _WIDE * width:
-            column = min(int((0.5 * (start + end) - t0) / width), columns - 1)
-            narrow.setdefault(column, {})[interval.mode] = None
-    hairlines = [
-        Bar(t0 + k * width, t0 + (k + 1) * width, i / len(modes), (i + 1) / len(modes), mode)
-        for k, modes in narrow.items()
-        for i, mode in enumerate(modes)
-    ]
-    return wide + hairlines, any(len(modes) > 1 for modes in narrow.values())
+        a, b = (start - t0) / width, (end - t0) / width
+        covered = range(min(int(a), columns - 1), min(int(b), columns - 1) + 1)
+        is_narrow = b - a < _WIDE
+        if is_narrow:
+            hairlines[min(int((a + b) / 2), columns - 1)] = interval.mode
+            narrow.update(covered)
+        for k in covered if is_narrow else {covered[0], covered[-1]}:  # no hairline is further inside
+            times[k][interval.mode] += min(b, k + 1) - max(a, k)
+    bars, is_divided = wide, False
+    for k, mode in hairlines.items():
+        modes = [one for one in order if one in times[k]] if narrow[k] > 1 else [mode]
+        is_divided = is_divided or len(modes) > 1
+        edges = [0.0, *accumulate(_heights([times[k][one] for one in modes], 1 / rows))]
+        start, end = t0 + k * width, t0 + (k + 1) * width
+        bars += [
+            Bar(start, end, *low_high, one) for low_high, one in zip(pairwise(edges), modes, strict=True)
+        ]
+    return bars, is_divided
+
+
+def _heights(times: Sequence[float], least: float) -> list[float]:
+    """Return heights in proportion to times, with the sum 1; none is below a least height if there is room."""
+    least = min(least, 1 / len(times))
+    small = {i for i, time in enumerate(times) if time <= least * sum(times)}
+    while True:
+        rest = sum(time for i, time in enumerate(times) if i not in small)
+        scale = (1 - least * len(small)) / rest if rest > 0 else 0.0
+        more = {i for i, time in enumerate(times) if i not in small and time * scale < least}
+        if not more:
+            break
+        small |= more
+    return [least if i in small else time * scale for i, time in enumerate(times)]
