@@ -13,11 +13,10 @@ from hybridsim.expr.evaluate import evaluate
 from hybridsim.expr.grammar import TIME
 from hybridsim.solution.by_name import ByName
 from hybridsim.solution.event import ModeInterval, counted_kind
-from hybridsim.solution.files.tabulated import at_steps, tabulated
+from hybridsim.solution.files.tabulated import SegmentConstants, at_steps, constants_of, tabulated
 from hybridsim.solution.model_events import ModelEvents
 from hybridsim.solution.run import Run
 from hybridsim.solution.run_trajectory import relative_velocity
-from hybridsim.solution.segment_constants import SegmentConstants, constants_of
 
 if TYPE_CHECKING:
     from hybridsim.engine.record.block_list import SegmentBlockList

@@ -3,17 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from hybridsim.arguments import whole_number
+from hybridsim.engine.record.blocks import SegmentBlock, SegmentList
 from hybridsim.engine.record.segments import Segment
 from hybridsim.model.checks.units import time_unit, units_of
 from hybridsim.presentation.tables import Table
 from hybridsim.solution.run import Run
 
-Part = tuple[Segment, np.ndarray, np.ndarray]  # segment, indices of its times, local times
+
+class SegmentConstants(NamedTuple):
+    """What is constant in a segment: its modes (C,) and its run-time vector."""
+
+    z: np.ndarray
+    p: np.ndarray
+
+
+Part = tuple[Segment | SegmentConstants, np.ndarray, np.ndarray]  # segment, indices of its times, local times
 MOST_POINTS = 1 << 27  # rows per column: one gigabyte
+
+
+def constants_of(block: SegmentBlock | SegmentList, i: int) -> SegmentConstants:
+    """Return what is constant in a segment of a block; its motion is not computed."""
+    if isinstance(block, SegmentList):
+        return SegmentConstants(block[i].z, block[i].p)
+    return SegmentConstants(block.modes[i], block.vectors[i])
 
 
 def equal_steps(t0: float, t1: float, points: int) -> np.ndarray:
