@@ -16,6 +16,7 @@ MOST_INTERVALS = 120_000  # of all components; of more, the modes in each of man
 _FIRST_REASONS, _MOST_KINDS = 200, 50  # events with a reason: the first ones, and the first of each change
 _STATES_SIZE = 1_100_000  # bytes for the states at events
 _COLUMNS = 4096  # more than the page has pixels across
+_LEAST_SHARE = 1e-3  # of a column, for a mode that occurs in it
 
 
 def events_of(solution: Solution) -> dict[str, Any]:
@@ -119,25 +120,27 @@ def modes_of(solution: Solution) -> list[dict[str, Any]]:
 
 
 def in_columns(ends: np.ndarray, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return equal columns in place of many intervals; each column is divided among the modes that occur in it.
+    """Return equal columns in place of many intervals; each column is divided among its modes by their shares of time.
 
     ends (m, 2), numbers (m,) : the ends and modes of all intervals, ascending.
     """
     t0, t1 = ends[0, 0], ends[-1, 1]
     edges = np.linspace(t0, t1, _COLUMNS + 1)
+    width = edges[1] - edges[0]
+    knots = np.append(ends[:, 0], t1)
     first = np.clip(np.searchsorted(edges, ends[:, 0], side="right") - 1, 0, _COLUMNS - 1)
     last = np.clip(np.searchsorted(edges, ends[:, 1], side="left"), first + 1, _COLUMNS)
-    starts, modes = [], []
-    for mode in np.unique(numbers):
+    modes = np.unique(numbers)
+    shares = np.zeros((_COLUMNS, len(modes)))
+    for k, mode in enumerate(modes):
+        is_own = numbers == mode
         change = np.zeros(_COLUMNS + 1, dtype=np.int64)
-        np.add.at(change, first[numbers == mode], 1)
-        np.add.at(change, last[numbers == mode], -1)
-        seen = np.flatnonzero(np.cumsum(change)[:-1])
-        starts.append(seen)
-        modes.append(np.full(len(seen), mode))
-    column, mode = np.concatenate(starts), np.concatenate(modes)
-    order = np.lexsort((mode, column))
-    column, mode = column[order], mode[order]
-    count = np.bincount(column, minlength=_COLUMNS)
-    place = np.arange(len(column)) - np.repeat(np.cumsum(count) - count, count)[: len(column)]
-    return edges[column] + place / count[column] * (edges[1] - edges[0]), mode
+        np.add.at(change, first[is_own], 1)
+        np.add.at(change, last[is_own], -1)
+        spent = np.concatenate([[0.0], np.cumsum(np.where(is_own, np.diff(knots), 0.0))])
+        share = np.diff(np.interp(edges, knots, spent)) / width
+        shares[:, k] = np.where(np.cumsum(change)[:-1] > 0, np.maximum(share, _LEAST_SHARE), 0.0)
+    shares /= shares.sum(axis=1, keepdims=True)
+    column, found = np.nonzero(shares)
+    before = np.cumsum(shares, axis=1) - shares
+    return edges[column] + before[column, found] * width, modes[found]

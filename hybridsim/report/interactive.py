@@ -36,7 +36,7 @@ or right moves the cursor.</p>
 </section>"""
 
 _COLUMNS = """<p class="hint">The run has more intervals of modes than the page can hold. Each strip of modes
-has 4096 columns of equal time, and a column shows the modes that occur in it in equal parts.</p>
+has 4096 columns of equal time, and a column shows the share of each mode.</p>
 """
 
 _EVENTS = """<section aria-labelledby="h-events" id="events">

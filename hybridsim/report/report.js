@@ -119,9 +119,7 @@ const drawCurve = (canvas, quantity) => {
   const found = trace(quantity.index, Math.max(width - LEFT - RIGHT, 10) * (window.devicePixelRatio || 1));
   const least = found.low - found.margin, most = found.high + found.margin;
   const x = t => xOf(t, width), y = value => height - 3 - (value - least) / (most - least) * (height - 6);
-  context.fillStyle = theme("weak");
-  context.strokeStyle = theme("grid");
-  context.textAlign = "right";
+  Object.assign(context, { fillStyle: theme("weak"), strokeStyle: theme("grid"), textAlign: "right" });
   for (const [value, text] of ticks(least / scale, most / scale, 6)) {
     stroke(context, [[LEFT, y(value * scale)], [width - RIGHT, y(value * scale)]]);
     context.fillText(text, LEFT - 6, clamp(y(value * scale), 6, height - 6));
@@ -142,23 +140,27 @@ const drawCurve = (canvas, quantity) => {
   context.setLineDash([3, 3]);
   for (const [t, before, after] of found.jumps) stroke(context, [[x(t), y(before)], [x(t), y(after)]]);
 };
-// An interval that is narrower than three pixels gets a column of pixels, which the modes of such intervals share.
+// An interval that is narrower than three pixels gets a column, in which several show the shares of their modes.
 const drawStrip = (canvas, component) => {
-  const { context, width } = prepared(canvas, STRIP), columns = Math.max(Math.floor(width - LEFT - RIGHT), 1);
-  const { starts, mode } = component, narrow = new Map();
-  const bar = (x, wide, from, to, k) => {
-    context.fillStyle = colourOf(component, k);
-    context.fillRect(x, 2 + from * (STRIP - 4), wide, (to - from) * (STRIP - 4));
-  };
+  const { context, width } = prepared(canvas, STRIP), most = Math.max(Math.floor(width - LEFT - RIGHT), 1) - 1;
+  const { starts, mode } = component, columns = new Map(), high = STRIP - 4;
+  const x = t => clamp(xOf(t, width) - LEFT, 0, most + 1), columnOf = at => Math.min(Math.floor(at), most);
+  const bar = (from, wide, low, tall, k) => Object.assign(context, { fillStyle: colourOf(component, k) })
+    .fillRect(LEFT + from, 2 + (1 - low - tall) * high, wide, tall * high);
   for (let i = Math.max(above(starts, view.a) - 1, 0); i < starts.length && starts[i] <= view.b; i++) {
-    const start = clamp(xOf(starts[i], width), LEFT, width - RIGHT);
-    const end = clamp(xOf(i + 1 < starts.length ? starts[i + 1] : t1, width), LEFT, width - RIGHT);
-    const column = clamp(Math.floor((start + end) / 2 - LEFT), 0, columns - 1);
-    bar(start, end - start, 0, 1, mode[i]);
-    if (end - start < 3) narrow.set(column, (narrow.get(column) || new Set()).add(mode[i]));
+    const a = x(starts[i]), b = x(i + 1 < starts.length ? starts[i + 1] : t1), step = b - a < 3 ? 1 : columnOf(b) - columnOf(a);
+    bar(a, b - a, 0, 1, mode[i]);
+    for (let k = columnOf(a); k <= columnOf(b) && b > a; k += step) {
+      const column = columns.get(k) || columns.set(k, { shares: [], narrow: [] }).get(k);
+      column.shares[mode[i]] = (column.shares[mode[i]] || 0) + Math.min(b, k + 1) - Math.max(a, k);
+      if (b - a < 3) column.narrow.push(k === columnOf((a + b) / 2) ? mode[i] : -1);
+    }
   }
-  narrow.forEach((modes, column) =>
-    [...modes].sort().forEach((k, i) => bar(LEFT + column, 1, i / modes.size, (i + 1) / modes.size, k)));
+  columns.forEach(({ shares, narrow }, k) => {
+    const tall = shares.map((share, j) => narrow.length > 1 || j === narrow[0] ? Math.max(share, 1 / high) : 0);
+    const sum = tall.reduce((total, one) => total + one, 0);
+    if (sum) tall.reduce((low, one, j) => (bar(k, 1, low, one / sum, j), low + one / sum), 0);
+  });
 };
 const drawAxis = canvas => {
   const { context, width } = prepared(canvas, AXIS);
@@ -233,8 +235,7 @@ const timeAt = event => {
 const connectChart = () => {
   for (const box of all("#chart > .curve, #chart > .strip")) {
     const canvas = box.querySelector("canvas"), value = box.querySelector("output"), k = Number(box.dataset.index);
-    const [draw, text, one] = box.className === "curve" ? [drawCurve, valueText, quantities[k]]
-      : [drawStrip, modeText, components[k]];
+    const [draw, text, one] = box.className === "curve" ? [drawCurve, valueText, quantities[k]] : [drawStrip, modeText, components[k]];
     rows.push({ box, value, draw: () => draw(canvas, one), text: t => text(one, t) });
   }
   all("#boxes input").forEach((input, k) => { input.onchange = () => { rows[k].box.hidden = !input.checked; redraw(); }; });
@@ -272,8 +273,7 @@ const drawPlane = (canvas, pair, component) => {
   const part = (i, value) => (value - ranges[i][0]) / (ranges[i][1] - ranges[i][0]);
   const x = value => LEFT + part(0, value) * (width - LEFT - RIGHT), y = value => base - part(1, value) * (base - 6);
   const sizes = pair.map(q => VISIBLE * (q.high - q.low)), paths = new Map();
-  context.strokeStyle = theme("grid");
-  context.fillStyle = theme("weak");
+  [context.strokeStyle, context.fillStyle] = [theme("grid"), theme("weak")];
   pair.forEach(({ scale }, i) => {
     const [from, to] = ranges[i].map(value => value / scale);
     context.textAlign = i ? "right" : "center";

@@ -53,6 +53,17 @@ def test_every_mode_of_a_column_is_there() -> None:
         assert set(modes[column == k].tolist()) == expected
 
 
+def test_a_column_shows_the_share_of_each_mode() -> None:
+    """Each of 100 000 cycles has stick for a tenth and slip for the rest, and so has each column within a cycle."""
+    begin = np.arange(100_000)
+    starts = np.column_stack([begin, begin + 0.1]).ravel()
+    ends = np.column_stack([starts, np.append(starts[1:], 100_000)])
+    t, modes = in_columns(ends, np.tile([0, 1], 100_000))
+    shares = np.diff(np.append(t, 100_000)) * _COLUMNS / 100_000
+    assert (modes == np.tile([0, 1], _COLUMNS)).all()
+    assert np.allclose(shares[::2], 0.1, atol=0.9 * _COLUMNS / 100_000)
+
+
 def test_indices_take_the_smallest_type() -> None:
     assert [indices([most])["kind"] for most in (255, 256, 65_536)] == ["u1", "u2", "u4"]
 
