@@ -155,6 +155,14 @@ def test_a_sweep_reads_coordinates_contacts_and_starts() -> None:
     for name in names[:-1]:
         assert one[name] == pytest.approx(other[name], rel=1e-8)
     assert one.to_dict()["provenance"]["parameters"]["f2.mu"] == limits(2)[1]
+    spent = hs.sweep(
+        system, {"f1.mu": [0.3]}, [f"mode_fraction.f1.{mode}" for mode in ("stick", "slip+", "slip-")]
+    )
+    assert sum(float(part[0]) for part in spent.values.values()) == pytest.approx(1.0, abs=1e-12)
+    last = hs.sweep(system, {"q1": [0.5]}, "final", t_span=(0, 1))["final.v2"]
+    assert last[0] == hs.simulate(system, (0, 1), x0={"q1": 0.5}).x_end[3]
+    with pytest.raises(UsageError, match="maximum"):
+        hs.sweep(system, {"q1": [0.5]}, "maximum.q1", t_span=(0, 1))
     failed = hs.sweep(system, {"f1.normal": [-1.0, 1.0]}, "amplitude.q1")
     assert "f1" in failed.status[0] and failed.status[1] == "ok"
 

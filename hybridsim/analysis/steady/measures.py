@@ -165,7 +165,7 @@ class Measures:
     @property
     def rms(self) -> ByName:
         """Root of the mean square of each quantity over the period."""
-        return self._each("rms", lambda q: math.sqrt(self.energy[q] / self._orbit.duration))
+        return self._each("rms", lambda q: math.sqrt(self.energy[q] / self._orbit_with(q).duration))
 
     def harmonic(self, name: str, k: int = 1) -> complex:
         """Return the amplitude c_k of q(t) = c_0 + sum of Re(c_k exp(2 pi i k t/T)), with the forcing's time t.

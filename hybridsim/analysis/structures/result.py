@@ -78,6 +78,10 @@ class StructureSteadyState(SteadyState):
         return tuple(self._run.event_names)
 
     @cached_property
+    def _modes(self) -> tuple[str, ...]:
+        return tuple(f"{contact}.{mode}" for contact in self._contacts for mode in _MODES.values())
+
+    @cached_property
     def _orbit(self) -> Orbit:
         """The orbit of the contacts; each coordinate has an orbit of its own."""
         self._require_period()

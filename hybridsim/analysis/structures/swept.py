@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 from hybridsim.arguments import cannot_be, chosen_model
+from hybridsim.engine.system.system_cache import system_of
 from hybridsim.expr import Expression, evaluate, parse, resolve
 from hybridsim.mechanics.declaration.named_values import values_of, with_values
 from hybridsim.mechanics.declaration.system import MechanicalContact, MechanicalSystem
@@ -58,6 +59,11 @@ class SweptSystem:
         contacts = [contact.name for contact in self.contacts]
         return (*self.system.names, *self.system.velocities, *contacts, *map(relative_velocity, contacts))
 
+    @property
+    def modes(self) -> list[str]:
+        """The names of all modes, such as "f.slip+"."""
+        return [f"{contact.name}.{mode}" for contact in self.contacts for mode in ("stick", "slip+", "slip-")]
+
     def parameter_values(self) -> dict[str, float]:
         """Return the named values."""
         return values_of(self.system)
@@ -102,6 +108,13 @@ def model_to_sweep(model: Any, params: Any) -> Any:
 def quantities_of(model: Any) -> list[str]:
     """Return the names of the quantities of a model or a structure that can be measured."""
     return list(model.quantities if isinstance(model, SweptSystem) else units_of(model))
+
+
+def modes_of(model: Any) -> list[str]:
+    """Return the names of all modes of a model or a structure, such as "f.slip+"."""
+    if isinstance(model, SweptSystem):
+        return model.modes
+    return [f"{a.name}.{mode}" for a in system_of(model).declared for mode in a.modes]
 
 
 def is_structure(model: object) -> bool:

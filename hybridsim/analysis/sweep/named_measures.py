@@ -22,7 +22,7 @@ from hybridsim.analysis.steady.together import (
     steady_motions,
 )
 from hybridsim.analysis.structures.result import StructureSteadyState
-from hybridsim.analysis.structures.swept import is_structure, quantities_of
+from hybridsim.analysis.structures.swept import is_structure, modes_of, quantities_of
 from hybridsim.analysis.sweep.last_period import OF_MOTION, LastPeriod, MeasuredPeriod, period_of
 from hybridsim.analysis.sweep.run_readings import (
     FINAL,
@@ -30,7 +30,6 @@ from hybridsim.analysis.sweep.run_readings import (
     OF_MODE,
     OF_QUANTITY,
     OfRun,
-    modes_of,
     of_run,
 )
 from hybridsim.analysis.sweep.work.job import Incomplete, Job, Outcome, Settings, Together, Watch

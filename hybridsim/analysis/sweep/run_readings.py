@@ -10,12 +10,11 @@ from functools import cached_property
 from typing import Any
 
 from hybridsim.analysis.steady.over_run import OverRun
+from hybridsim.analysis.structures.swept import is_structure, modes_of, quantities_of
 from hybridsim.calls import Default
-from hybridsim.engine.system.system_cache import system_of
 from hybridsim.errors import SimulationError, UsageError, nearest
 from hybridsim.expr import Expression, evaluate, parse, require_names
 from hybridsim.model import Model
-from hybridsim.model.checks.units import units_of
 from hybridsim.simulate import simulate
 
 FINAL, FIRST_PASSAGE = "final", "first_passage"
@@ -81,6 +80,13 @@ def of_run(reading_names: Sequence[str], model: Model, options: Mapping[str, Any
     states = [state.name for state in model.states]
     if tuple(reading_names) == (FINAL,):
         return OfRun(tuple(f"{FINAL}.{name}" for name in states), options)
+    if is_structure(model):
+        beyond = next((word for word in reading_names if not word.startswith(f"{FINAL}.")), None)
+        if beyond is not None:
+            raise UsageError(
+                f"`measure` {beyond!r} of a run is not supported for a MechanicalSystem",
+                remedy="use 'final', or remove `t_span`: the readings are then those of the steady state",
+            )
     quantities = _quantities_of(model)
     known = [f"{FINAL}.{name}" for name in states]
     known += [f"{head}.{name}" for head in OF_QUANTITY for name in quantities]
@@ -111,20 +117,15 @@ def passage_of(word: str) -> Passage | None:
     return None if found is None else Passage(found[1], found[2] == ">", parse(found[3]))
 
 
-def modes_of(model: Model) -> list[str]:
-    """Return the names of all modes, such as "f.slip+"."""
-    return [f"{a.name}.{mode}" for a in system_of(model).declared for mode in a.modes]
-
-
 def _quantities_of(model: Model) -> list[str]:
     discrete = {d.name for d in model.discrete}
-    return [name for name in units_of(model) if name not in discrete]
+    return [name for name in quantities_of(model) if name not in discrete]
 
 
 def _reading(run: OverRun, word: str) -> float:
     head, _, name = word.partition(".")
     if head == FINAL:
-        return float(run.solution.y[run.solution.names.index(name), -1])
+        return float(run.solution.x_end[run.solution.names.index(name)])
     passage = passage_of(word)
     if passage is not None:
         level = evaluate(passage.level, run.solution.model.parameter_values())
@@ -133,4 +134,4 @@ def _reading(run: OverRun, word: str) -> float:
 
 
 def _end_of(run: OverRun) -> dict[str, float]:
-    return dict(zip(run.solution.names, run.solution.y[:, -1].tolist(), strict=True))
+    return dict(zip(run.solution.names, run.solution.x_end.tolist(), strict=True))
