@@ -267,12 +267,10 @@ class Measures:
     def grazing(self) -> Grazing | None:
         """The guard that comes closest to zero without reaching it, or None if there is no such guard.
 
-        A guard at an event that makes it zero is left out there. So are points of tables, and a guard that varies
-        too fast for its minima to be found.
+        Left out are a guard at an event that makes it zero, points of tables, and guards that vary too fast.
         """
-        orbit, solution = self._orbit, self.solution
+        orbit, solution, system = self._orbit, self.solution, self.solution._system
         tables = {name for contact in solution.model.contacts for name in contact.table_variables}
-        system = solution._system
         guards = [name for name in orbit.names if name.startswith("guard ")]
         largest = {name: abs(orbit.of(name)).max() for name in guards if name not in orbit.too_fast}
         found: list[Grazing] = []

@@ -446,9 +446,7 @@ def _refuse_what_ends(system: System, has_period: bool) -> None:
         if declared.period is None:
             raise UsageError(
                 f"model {model.name} is driven by {declared.subject}, a {declared.kind}: there is no steady state",
-                remedy="use a periodic input, or replace the step by its final value"
-                if declared.kind == "step"
-                else "use a periodic input, or replace the input by its final value",
+                remedy=f"use a periodic input, or replace the {declared.kind} by its final value",
             )
     for clock in model.schedules:
         if clock.period is None or clock.count is not None:
