@@ -12,7 +12,7 @@ _lock = SharedLock()
 
 
 def python_tree(text: str, mode: str = "exec") -> Any:
-    """Return the syntax tree of a text like `ast.parse`; ``mode="eval"`` parses an expression.
+    """Return the syntax tree of a text, as `ast.parse` does; ``mode="eval"`` parses an expression.
 
     Before Python 3.12 all threads share one counter of the depth, so that parsing in two threads can raise SystemError
     (CPython issue 106905). Warning filters are shared by all threads, too.

@@ -91,7 +91,7 @@ def _reasons(solution: Solution, chosen: list[int]) -> dict[str, str]:
 
 
 def modes_of(solution: Solution) -> list[dict[str, Any]]:
-    """Return for each component its modes with their colours, and the time intervals of the modes or columns."""
+    """Return the modes of each component with their colours, and their time intervals or columns."""
     colours = mode_colours(solution.components)
     held = {c.name: c.surface.hold for c in solution.components if getattr(c, "surface", None)}
     intervals = solution.modes

@@ -93,7 +93,7 @@ class Settling:
         return found if next(shorter, None) is None else None
 
     def _follow(self, step: Callable[[], Any]) -> Any:
-        """Follow the motion for one period by a method of the map, store the states, and return its result."""
+        """Follow the motion for one period by calling `step`, store the states, and return what `step` returned."""
         before = self.map.x
         found = step()
         self._states.append(self.map.x)

@@ -147,7 +147,7 @@ class Rounds:
         return has_fired
 
     def _delay(self, p: np.ndarray, s: float, origin: float, fired: Sequence[Occurrence]) -> None:
-        """Shift the state to the time at which the guards fire after a small change of the start.
+        """Shift the state to the time at which the guards fire if the start is changed a little.
 
         They must fire together, and no other event may happen before that.
         """

@@ -358,7 +358,7 @@ class Rewriting(RewritingState):
     def _stairs(
         self, jump: Jump, argument: ast.expr, nested: ast.expr, other: ast.expr, way: int, here: Here
     ) -> ast.expr | None:
-        """Return nested jumps between constants at parallel borders as a sum of signs, or None.
+        """Return nested jumps between constants as a sum of signs if their borders are parallel, otherwise None.
 
         `way` is the side (1 or -1) of the first border on which the second border is.
         """

@@ -68,7 +68,7 @@ class Motion:
         return float(self.segments[-1].t + self.segments[-1].h)
 
     def _values(self, segment: Segment, times: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Evaluate a segment by Horner's scheme in doubles, in the fraction of the step."""
+        """Evaluate a segment at fractions of its step by Horner's scheme, in double precision."""
         high = float(segment.t)
         low = float(segment.t - high)
         fraction = np.clip(((times - high) - low) / float(segment.h), 0.0, 1.0) if segment.h else 0.0 * times
