@@ -97,26 +97,26 @@ def test_the_page_on_own_laws_runs_and_keeps_them_short(tmp_path: Path) -> None:
         assert len(text.splitlines()) < 30
         model = hs.Model.from_toml(text)
         solutions.append(hs.simulate(model, (0, model.duration_value() or 1)))
-    assert [sol.status for sol in solutions] == ["finished"] * 3
+    assert [sol.status for sol in solutions] == ["finished"] * 4
     (code,) = blocks(page, "python")
     script = tmp_path / "shown.py"
     script.write_text(code.replace("fading.png", (tmp_path / "fading.png").as_posix()), encoding="utf-8")
     sol = runpy.run_path(str(script))["sol"]
     assert (tmp_path / "fading.png").stat().st_size > 10_000
-    assert sol(12.0) == pytest.approx(solutions[1](12.0), rel=1e-9)
+    assert sol(12.0) == pytest.approx(solutions[2](12.0), rel=1e-9)
 
 
 def test_the_page_on_many_contacts_runs_and_is_short(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     shown = blocks(ROOT / "docs" / "how-to" / "many-contacts.md", "python")
-    assert [len(code.splitlines()) < 30 for code in shown] == [True] * 4
+    assert [len(code.splitlines()) < 30 for code in shown] == [True] * 6
     script = tmp_path / "shown.py"
     script.write_text("\n".join(shown), encoding="utf-8")
     runpy.run_path(str(script))
     said = re.findall(r"^print\(.*\)  # (.+)$", "\n".join(shown), re.MULTILINE)
     assert capsys.readouterr().out.splitlines() == said
-    assert len(said) == 5
+    assert len(said) == 10
     first = tmp_path / "first.py"
     first.write_text(
         shown[0] + 'hs.simulate(system.to_model(), (0, 1), integrator="dop853")', encoding="utf-8"

@@ -193,7 +193,7 @@ def test_the_time_has_a_name_of_its_own(tmp_path: Path) -> None:
         "note,place,time_s\n" + "".join(f"a,{1 + 0.3 * each!r},{each!r}\n" for each in t.tolist())
     )
     assert hs.fit(LINE, hs.Record(path, names), {"a": (0, 1)}).values["a"] == pytest.approx(0.3, abs=1e-8)
-    with pytest.raises(hs.UsageError, match="'t', but note, place, time_s"):
+    with pytest.raises(hs.UsageError, match="no column 't'; the columns are: note, place, time_s"):
         hs.Record(path)
     with pytest.raises(hs.UsageError, match="`quantities` contains 'plaice'") as caught:
         hs.Record(path, {"plaice": "x", "time_s": "t"})

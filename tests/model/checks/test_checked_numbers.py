@@ -38,7 +38,7 @@ def sliding(law: hs.FrictionLaw) -> hs.Model:
         (lambda: hs.MechanicalSystem([10**400], None, None), "`M` cannot be"),
         (lambda: hs.MechanicalSystem([], None, None), "M is empty"),
         (lambda: hs.MechanicalSystem([1.0], None, None, contacts=[3]), "contacts contain 3"),
-        (lambda: hs.MechanicalSystem([1.0], None, None, forcing=[math.inf]), "holds inf"),
+        (lambda: hs.MechanicalSystem([1.0], None, None, forcing=[math.inf]), "contains inf"),
         (lambda: hs.MechanicalContact("f", {"a": 1.0}, 1.0, "coulomb"), "coordinate 'a'"),
     ],
 )

@@ -364,13 +364,14 @@ def test_a_part_can_be_checked_alone_but_not_run(capfd: pytest.CaptureFixture[st
     assert "nothing is connected to the input 'body' of model axle" in capfd.readouterr().err
 
 
-def test_two_hundred_parts_load_within_two_seconds(tmp_path: Path) -> None:
-    written(
-        tmp_path,
-        block=(EXAMPLES / "block.toml").read_text(),
-        chain=(EXAMPLES / "chain.toml").read_text().replace("20", "200"),
-    )
-    began = time.process_time()
-    model = hs.load(tmp_path / "chain.toml")
-    assert time.process_time() - began < 2.0
+def test_two_hundred_parts_load_in_proportion_to_twenty(tmp_path: Path) -> None:
+    """Ten times the parts take about ten times as long; a time in proportion to the square would be a hundred."""
+    seconds = {}
+    for count in (20, 20, 200):  # what is loaded or compiled once is not counted
+        chain = (EXAMPLES / "chain.toml").read_text().replace("20", str(count))
+        written(tmp_path, block=(EXAMPLES / "block.toml").read_text(), chain=chain)
+        began = time.process_time()
+        model = hs.load(tmp_path / "chain.toml")
+        seconds[count] = time.process_time() - began
+    assert seconds[200] < 30.0 * seconds[20]
     assert len(model.contacts) == 200
