@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
-from hybridsim.plot import style
+from hybridsim.plot.shared import style
 
 IMAGES = Path(__file__).parents[2] / "docs" / "images"
 COLUMN = 850  # pixels: the width of the text of a page on a wide screen

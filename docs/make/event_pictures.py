@@ -13,7 +13,7 @@ import numpy as np
 from mpmath import mp
 
 import hybridsim as hs
-from hybridsim.plot import style
+from hybridsim.plot.shared import style
 
 IMAGES = Path(__file__).parents[2] / "docs" / "images"
 BLUE, ORANGE, GREEN = style.PALETTE[:3]

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 import hybridsim as hs
-from hybridsim.plot import style
+from hybridsim.plot.shared import style
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "studies" / "brake.md"

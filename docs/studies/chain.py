@@ -22,7 +22,7 @@ from rivals import chain_rk4
 from rivals.page import machine
 
 import hybridsim as hs
-from hybridsim.plot import style
+from hybridsim.plot.shared import style
 
 SIZES = (10, 30, 100, 300, 1000)
 SPAN = {10: 200.0, 30: 100.0, 100: 40.0, 300: 15.0, 1000: 6.0}

@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 import hybridsim as hs
-from hybridsim.plot import style
+from hybridsim.plot.shared import style
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
 from reference.dfcs_closed_form import Motion, Oscillator

@@ -21,7 +21,7 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
 from integrators.fixed_step.impact_models import balls, pendulum, shaken
 
 import hybridsim as hs
-from hybridsim.plot import style
+from hybridsim.plot.shared import style
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "studies" / "moreau.md"

@@ -17,7 +17,7 @@ from stability_runs import (
     Method,
 )
 
-from hybridsim.plot import style
+from hybridsim.plot.shared import style
 
 Map = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]  # steps, zones, errors, stops in excess
 LOW, HIGH = 1e-6, 1.0  # errors that colours tell apart

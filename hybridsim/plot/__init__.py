@@ -13,11 +13,11 @@ from hybridsim.plot.law_comparison import law_comparison
 from hybridsim.plot.law_fits import law_fits
 from hybridsim.plot.phase_portrait import phase_portrait
 from hybridsim.plot.regularisation import regularisation
-from hybridsim.plot.style import save
+from hybridsim.plot.shared.style import save
 from hybridsim.plot.suite_page import suite_page
-from hybridsim.plot.sweep_lines import sweep_lines
-from hybridsim.plot.sweep_map import sweep_map
-from hybridsim.plot.sweep_picture import sweep
+from hybridsim.plot.sweeps.lines import sweep_lines
+from hybridsim.plot.sweeps.map import sweep_map
+from hybridsim.plot.sweeps.picture import sweep
 from hybridsim.plot.time_history import TimeHistoryAxes, time_history
 from hybridsim.plot.work_precision import work_precision
 

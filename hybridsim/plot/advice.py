@@ -12,8 +12,8 @@ from matplotlib.colors import ListedColormap
 from matplotlib.patches import Patch
 
 from hybridsim.errors import UsageError
-from hybridsim.plot import style
-from hybridsim.plot.sweep_readings import NO_COLOUR, draw_map
+from hybridsim.plot.shared import style
+from hybridsim.plot.sweeps.readings import NO_COLOUR, draw_map
 
 if TYPE_CHECKING:
     from hybridsim.analysis import Advice

@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from hybridsim.model.checks.units import label_of, units_of
-from hybridsim.plot import style
-from hybridsim.plot.scale import label_axis
+from hybridsim.plot.shared import style
+from hybridsim.plot.shared.scale import label_axis
 
 if TYPE_CHECKING:
     from hybridsim.analysis import Branch

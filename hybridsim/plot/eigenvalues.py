@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from matplotlib.axes import Axes
 
-from hybridsim.plot import style
+from hybridsim.plot.shared import style
 
 if TYPE_CHECKING:
     from hybridsim.analysis import Linearization

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 
 from hybridsim.arguments import known_name
 from hybridsim.errors import UsageError
-from hybridsim.plot import style
+from hybridsim.plot.shared import style
 
 if TYPE_CHECKING:
     from hybridsim.analysis import Sensitivities

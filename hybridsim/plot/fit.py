@@ -9,9 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from hybridsim.model.checks.units import time_unit
-from hybridsim.plot import style
-from hybridsim.plot.scale import label_axis
-from hybridsim.plot.smooth_parts import Window, unit_of, window_of
+from hybridsim.plot.shared import style
+from hybridsim.plot.shared.scale import label_axis
+from hybridsim.plot.shared.smooth_parts import Window, unit_of, window_of
 
 if TYPE_CHECKING:
     from hybridsim.analysis import Fit

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from hybridsim.errors import UsageError
 from hybridsim.expr import evaluate, parse
 from hybridsim.model import Contact, FrictionLaw, Model, Output, State, load_law
-from hybridsim.plot import style
+from hybridsim.plot.shared import style
 from hybridsim.simulate import simulate
 
 _POINTS = 2000  # per period; a loop of Iwan's model has at most a hundred corners

@@ -6,7 +6,7 @@ from matplotlib.axes import Axes
 
 from hybridsim.errors import UsageError
 from hybridsim.plot.orbit import draw_orbit
-from hybridsim.plot.smooth_parts import refuse_arrays
+from hybridsim.plot.shared.smooth_parts import refuse_arrays
 from hybridsim.solution import Solution
 
 

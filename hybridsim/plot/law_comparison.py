@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.axes import Axes
 
-from hybridsim.plot import style
-from hybridsim.plot.scale import label_axis, with_prefix
-from hybridsim.plot.smooth_parts import smooth_parts_of, unit_of, window_of
+from hybridsim.plot.shared import style
+from hybridsim.plot.shared.scale import label_axis, with_prefix
+from hybridsim.plot.shared.smooth_parts import smooth_parts_of, unit_of, window_of
 
 if TYPE_CHECKING:
     from hybridsim.analysis import LawComparison

@@ -11,9 +11,16 @@ from matplotlib.collections import LineCollection
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from hybridsim.plot import style
-from hybridsim.plot.scale import label_axis, shared_powers
-from hybridsim.plot.smooth_parts import SmoothPart, extent, smooth_parts_of, title_of, unit_of, window_of
+from hybridsim.plot.shared import style
+from hybridsim.plot.shared.scale import label_axis, shared_powers
+from hybridsim.plot.shared.smooth_parts import (
+    SmoothPart,
+    extent,
+    smooth_parts_of,
+    title_of,
+    unit_of,
+    window_of,
+)
 from hybridsim.solution import Solution
 
 Points = NDArray[np.float64]

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 from matplotlib.axes import Axes
 from matplotlib.ticker import EngFormatter, LogLocator, NullFormatter
 
-from hybridsim.plot import style
-from hybridsim.plot.lines import draw_line, looks
+from hybridsim.plot.shared import style
+from hybridsim.plot.shared.lines import draw_line, looks
 from hybridsim.plot.work_precision import handles, headline, verdict_of
 
 if TYPE_CHECKING:

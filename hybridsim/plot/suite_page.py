@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 from matplotlib.axes import Axes
 
-from hybridsim.plot import style
-from hybridsim.plot.lines import looks
+from hybridsim.plot.shared import style
+from hybridsim.plot.shared.lines import looks
 from hybridsim.plot.work_precision import draw_panel, handles
 
 if TYPE_CHECKING:

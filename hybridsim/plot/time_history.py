@@ -14,9 +14,9 @@ from matplotlib.lines import Line2D
 from hybridsim.errors import UsageError
 from hybridsim.mechanics.declaration.system import MechanicalSystem
 from hybridsim.model.checks.units import time_unit
-from hybridsim.plot import style
-from hybridsim.plot.scale import label_axis, shared_powers
-from hybridsim.plot.smooth_parts import (
+from hybridsim.plot.shared import style
+from hybridsim.plot.shared.scale import label_axis, shared_powers
+from hybridsim.plot.shared.smooth_parts import (
     CUTS,
     Samples,
     Window,
@@ -29,8 +29,8 @@ from hybridsim.plot.smooth_parts import (
     unit_of,
     window_of,
 )
-from hybridsim.plot.strip import changing_components, draw_strip, mode_colours_of
-from hybridsim.plot.symbols import symbol_of, unit_text
+from hybridsim.plot.shared.strip import changing_components, draw_strip, mode_colours_of
+from hybridsim.plot.shared.symbols import symbol_of, unit_text
 from hybridsim.solution import Solution
 
 _MOST_QUANTITIES = 4  # the default number of quantities, and of outputs

@@ -14,8 +14,8 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import EngFormatter, FixedLocator, LogLocator, NullFormatter
 
 from hybridsim.errors import UsageError
-from hybridsim.plot import style
-from hybridsim.plot.lines import PALE, SIZE, Look, draw_line, looks
+from hybridsim.plot.shared import style
+from hybridsim.plot.shared.lines import PALE, SIZE, Look, draw_line, looks
 
 if TYPE_CHECKING:
     from hybridsim.analysis import Comparison

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from hybridsim.model import Model
 from hybridsim.model.checks.units import units_of
-from hybridsim.plot.scale import scaled_unit
+from hybridsim.plot.shared.scale import scaled_unit
 from hybridsim.report.embedded import array, numbers
 from hybridsim.report.sampling import Sampler
 from hybridsim.solution import Solution

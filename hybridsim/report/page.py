@@ -14,7 +14,7 @@ from hybridsim.errors import UsageError
 from hybridsim.files import path_text, write_text
 from hybridsim.model.checks.units import time_unit
 from hybridsim.plot.drawing.theme import DARK, LIGHT
-from hybridsim.plot.smooth_parts import refuse_arrays
+from hybridsim.plot.shared.smooth_parts import refuse_arrays
 from hybridsim.report import interactive, sections
 from hybridsim.report.curves import curves_of
 from hybridsim.report.embedded import json_in_html

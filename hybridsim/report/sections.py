@@ -15,7 +15,7 @@ from hybridsim.model.checks.units import time_unit
 from hybridsim.model.smoothing.explicit_corners import smoothing_of
 from hybridsim.plot.drawing.mechanism import mechanism
 from hybridsim.plot.drawing.theme import LIGHT
-from hybridsim.plot.style import as_svg
+from hybridsim.plot.shared.style import as_svg
 from hybridsim.presentation.automaton import lines_of
 from hybridsim.report.repeat import Settings
 from hybridsim.solution import Solution

@@ -11,7 +11,8 @@ from matplotlib.figure import Figure
 from plot.fake_comparison import comparison
 from plot.fake_solution import ball, oscillator
 
-from hybridsim.plot import friction_law, phase_portrait, save, style, time_history, work_precision
+from hybridsim.plot import friction_law, phase_portrait, save, time_history, work_precision
+from hybridsim.plot.shared import style
 
 sys.path.append(str(Path(__file__).parents[2] / "docs" / "make"))
 from check_pictures import IMAGES, contrast, faults_of_figure, faults_of_file

@@ -10,7 +10,7 @@ import pytest
 
 import hybridsim as hs
 from hybridsim.plot import time_history
-from hybridsim.plot.smooth_parts import Window, samples_of
+from hybridsim.plot.shared.smooth_parts import Window, samples_of
 
 
 def sawtooth(ticks: int) -> hs.Solution:

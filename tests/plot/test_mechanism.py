@@ -26,7 +26,7 @@ from hybridsim.plot.drawing.clip import Clip
 from hybridsim.plot.drawing.layout import ends_of
 from hybridsim.plot.drawing.poses import poses_at
 from hybridsim.plot.drawing.theme import DARK, LIGHT, Theme
-from hybridsim.plot.smooth_parts import Window
+from hybridsim.plot.shared.smooth_parts import Window
 from hybridsim.presentation.colours import INK, PALETTE
 
 SLIDE = """

@@ -18,7 +18,7 @@ from plot.fake_solution import FakeEvent, FakeInterval, ball, oscillator, oscill
 import hybridsim as hs
 from hybridsim.errors import UsageError
 from hybridsim.plot import friction_loop, phase_portrait, save, time_history
-from hybridsim.plot.smooth_parts import Window, smooth_parts_of
+from hybridsim.plot.shared.smooth_parts import Window, smooth_parts_of
 
 PERIOD = 2 * math.pi / oscillator_model().parameter_values()["omega"]
 
@@ -127,7 +127,7 @@ def test_modes_of_one_colour_are_told_apart_by_their_components() -> None:
     whole = replace(whole, modes={name: (span,) for name, span in spans.items()})
     colours = {"held": "#222222", "locked": "#222222"}
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("hybridsim.plot.style.mode_colours", lambda components: colours)
+        patch.setattr("hybridsim.plot.shared.style.mode_colours", lambda components: colours)
         legend = time_history(whole, ["x"]).modes.get_legend()
     assert [text.get_text() for text in legend.get_texts()] == ["held (f)", "locked (g)"]
 

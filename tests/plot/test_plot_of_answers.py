@@ -141,6 +141,6 @@ def test_plot_is_a_name_of_the_package_and_loads_when_it_is_used() -> None:
     code = (
         "import sys, hybridsim as hs\n"
         "assert 'matplotlib' not in sys.modules and 'plot' in dir(hs)\n"
-        "assert hs.plot.save.__module__ == 'hybridsim.plot.style' and 'matplotlib' in sys.modules"
+        "assert hs.plot.save.__module__ == 'hybridsim.plot.shared.style' and 'matplotlib' in sys.modules"
     )
     subprocess.run([sys.executable, "-c", code], check=True)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from matplotlib.figure import Figure
 
-from hybridsim.plot.scale import Scaled, label_axis, shared_powers
-from hybridsim.plot.symbols import label_of, symbol_of, unit_text
+from hybridsim.plot.shared.scale import Scaled, label_axis, shared_powers
+from hybridsim.plot.shared.symbols import label_of, symbol_of, unit_text
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 import hybridsim as hs
 from hybridsim.plot import save, sweep_lines, sweep_map
-from hybridsim.plot.sweep_readings import label_of, not_drawn, show_range
+from hybridsim.plot.sweeps.readings import label_of, not_drawn, show_range
 
 OMEGA, N = [300.0, 500.0, 400.0, 600.0], [20.0, 40.0]
 

@@ -12,7 +12,7 @@ from plot.fake_comparison import PERIOD, comparison
 
 from hybridsim.errors import UsageError
 from hybridsim.plot import save, work_precision
-from hybridsim.plot.lines import looks
+from hybridsim.plot.shared.lines import looks
 from hybridsim.plot.work_precision import label_ticks
 
 

@@ -11,7 +11,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.lines import Line2D
 from matplotlib.ticker import EngFormatter, LogLocator, NullFormatter
 
-from hybridsim.plot import style
+from hybridsim.plot.shared import style
 from rivals.race import Line
 from rivals.scenes import Scene
 

@@ -208,8 +208,8 @@ def _write(result: Sweep, over: str | None, folder: Path, session: Session) -> N
     if len(result.dimensions) > _MOST_DRAWN or not any(v.dtype.kind in "fc" for v in result.values.values()):
         return
     from hybridsim.plot import save, sweep
-    from hybridsim.plot.sweep_picture import is_map
-    from hybridsim.plot.sweep_readings import not_drawn
+    from hybridsim.plot.sweeps.picture import is_map
+    from hybridsim.plot.sweeps.readings import not_drawn
 
     save(sweep(result, over=over), folder / "sweep.png")
     session.wrote(folder / "sweep.png")

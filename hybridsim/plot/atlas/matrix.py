@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch, Rectangle
 
-from hybridsim.plot import style
+from hybridsim.plot.shared import style
 from hybridsim.testing.verdict import (
     ERROR,
     HANG,

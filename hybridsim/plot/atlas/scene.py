@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridsim.plot import style
+from hybridsim.plot.shared import style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -8,7 +8,7 @@ from typing import Any
 from PIL import Image
 
 from hybridsim.files import whole_file
-from hybridsim.plot.style import save
+from hybridsim.plot.shared.style import save
 
 _COLOURS = 48
 

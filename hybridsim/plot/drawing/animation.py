@@ -22,7 +22,7 @@ from hybridsim.plot.drawing.clip import Clip, Picture
 from hybridsim.plot.drawing.player import page
 from hybridsim.plot.drawing.poses import refuse_without_drawing
 from hybridsim.plot.drawing.theme import DARK, LIGHT
-from hybridsim.plot.smooth_parts import refuse_arrays, window_of
+from hybridsim.plot.shared.smooth_parts import refuse_arrays, window_of
 from hybridsim.solution import Solution
 
 SUFFIXES = (".gif", ".html", ".mp4")

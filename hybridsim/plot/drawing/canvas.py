@@ -14,15 +14,15 @@ from matplotlib.text import Text
 from numpy.typing import NDArray
 
 from hybridsim.model.parts.model import Model
-from hybridsim.plot import style
 from hybridsim.plot.drawing.frame import Frame
 from hybridsim.plot.drawing.kinds import items_of
 from hybridsim.plot.drawing.layout import layout_of
 from hybridsim.plot.drawing.outlines import Label, Outline, box_of
 from hybridsim.plot.drawing.poses import Poses, poses_at
 from hybridsim.plot.drawing.theme import Theme
-from hybridsim.plot.scale import with_prefix
-from hybridsim.plot.smooth_parts import Window, mode_lookup
+from hybridsim.plot.shared import style
+from hybridsim.plot.shared.scale import with_prefix
+from hybridsim.plot.shared.smooth_parts import Window, mode_lookup
 from hybridsim.solution import Solution
 
 Points = NDArray[np.float64]

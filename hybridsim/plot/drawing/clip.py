@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 
 from hybridsim.errors import UsageError
 from hybridsim.model.checks.units import time_unit
-from hybridsim.plot import style
 from hybridsim.plot.drawing.canvas import Canvas
 from hybridsim.plot.drawing.poses import poses_at
 from hybridsim.plot.drawing.theme import DARK, Theme, darken
-from hybridsim.plot.smooth_parts import Window, require_length
+from hybridsim.plot.shared import style
+from hybridsim.plot.shared.smooth_parts import Window, require_length
 from hybridsim.plot.time_history import time_history
 from hybridsim.solution import Solution
 

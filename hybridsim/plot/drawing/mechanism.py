@@ -5,10 +5,10 @@ from __future__ import annotations
 from matplotlib.axes import Axes
 
 from hybridsim.model.checks.units import time_unit
-from hybridsim.plot import style
 from hybridsim.plot.drawing.canvas import Canvas
 from hybridsim.plot.drawing.theme import DARK, LIGHT
-from hybridsim.plot.smooth_parts import refuse_arrays, window_of
+from hybridsim.plot.shared import style
+from hybridsim.plot.shared.smooth_parts import refuse_arrays, window_of
 from hybridsim.solution import Solution
 
 _WIDTH, _LEAST, _MOST, _HEAD = 6.4, 1.2, 5.0, 0.3  # inches

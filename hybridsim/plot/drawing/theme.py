@@ -10,7 +10,7 @@ from matplotlib.collections import Collection
 from matplotlib.colors import to_hex, to_rgba, to_rgba_array
 from matplotlib.figure import Figure
 
-from hybridsim.plot import style
+from hybridsim.plot.shared import style
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
-from hybridsim.plot import style
+from hybridsim.plot.shared import style
 from hybridsim.studies.he2026.measured.convergence import ALL_CASES, RIDGE, Curves
 from hybridsim.studies.he2026.pictures.motions import column_title
 

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
-from hybridsim.plot import style
+from hybridsim.plot.shared import style
 from hybridsim.studies.he2026.measured.deviation import EXACT, PUBLISHED, Maps
 from hybridsim.studies.he2026.measured.settings import LITERAL, MATTERING, SIGNS, ZEROED
 from hybridsim.studies.he2026.measured.step_study import EPS, STEPS, StepStudy

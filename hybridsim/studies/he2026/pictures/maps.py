@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, LogNorm
 from matplotlib.figure import Figure
 
-from hybridsim.plot import style
+from hybridsim.plot.shared import style
 from hybridsim.studies.he2026.measured.required_settings import EPS, STEPS, RequiredSettings
 from hybridsim.studies.he2026.measured.timed_map import TimedMap
 from hybridsim.studies.he2026.measured.truth import MODELS, Truth

@@ -8,7 +8,7 @@ from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullLocator
 
-from hybridsim.plot import style
+from hybridsim.plot.shared import style
 from hybridsim.studies.he2026.measured.response import Response
 
 _MICRO = 1e6

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from matplotlib.figure import Figure
 
-from hybridsim.plot import style
+from hybridsim.plot.shared import style
 from hybridsim.studies.he2026.measured.convergence import CASES
 from hybridsim.studies.he2026.measured.run_times import EPS, WITH, RunTimes
 from hybridsim.studies.he2026.measured.settings import SIGNS

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_hex, to_rgb
 from matplotlib.lines import Line2D
 
-from hybridsim.plot import style
+from hybridsim.plot.shared import style
 
 if TYPE_CHECKING:
     from hybridsim.analysis.compare.rows import Row

@@ -9,8 +9,8 @@ from matplotlib.collections import PolyCollection
 from matplotlib.patches import Patch
 
 from hybridsim.mechanics.declaration.system import MechanicalSystem
-from hybridsim.plot import style
-from hybridsim.plot.smooth_parts import Window
+from hybridsim.plot.shared import style
+from hybridsim.plot.shared.smooth_parts import Window
 from hybridsim.presentation.mode_strip import bars_of
 from hybridsim.solution import Solution
 

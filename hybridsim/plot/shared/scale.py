@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from matplotlib.axis import Axis, YAxis
 from matplotlib.ticker import Formatter
 
-from hybridsim.plot.symbols import label_of, unit_text
+from hybridsim.plot.shared.symbols import label_of, unit_text
 
 _PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 # Units that take a prefix at their start: "m" and "m/s" do; "kg" (which has one) and "1/s" do not.

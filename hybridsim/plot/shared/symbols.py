@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from hybridsim.plot.style import literal
+from hybridsim.plot.shared.style import literal
 
 _GREEK = {
     "alpha": "α", "beta": "β", "gamma": "γ", "delta": "δ", "epsilon": "ε", "zeta": "ζ", "eta": "η", "theta": "θ",

@@ -11,10 +11,10 @@ from matplotlib.axis import Axis
 from matplotlib.collections import QuadMesh
 
 from hybridsim.errors import UsageError
-from hybridsim.plot import style
-from hybridsim.plot.scale import label_axis
-from hybridsim.plot.style import literal
-from hybridsim.plot.symbols import symbol_of, unit_text
+from hybridsim.plot.shared import style
+from hybridsim.plot.shared.scale import label_axis
+from hybridsim.plot.shared.style import literal
+from hybridsim.plot.shared.symbols import symbol_of, unit_text
 
 if TYPE_CHECKING:
     from hybridsim.analysis import Sweep

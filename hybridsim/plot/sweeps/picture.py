@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 from matplotlib.axes import Axes
 
-from hybridsim.plot.sweep_lines import sweep_lines
-from hybridsim.plot.sweep_map import sweep_map
+from hybridsim.plot.sweeps.lines import sweep_lines
+from hybridsim.plot.sweeps.map import sweep_map
 
 if TYPE_CHECKING:
     from hybridsim.analysis import Sweep

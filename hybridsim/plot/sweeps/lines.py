@@ -10,8 +10,8 @@ from matplotlib.axes import Axes
 
 from hybridsim.arguments import known_name
 from hybridsim.errors import UsageError
-from hybridsim.plot import style
-from hybridsim.plot.sweep_readings import (
+from hybridsim.plot.shared import style
+from hybridsim.plot.sweeps.readings import (
     NO_RESULT,
     chosen_names,
     label_parameter,

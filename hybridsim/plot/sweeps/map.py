@@ -11,8 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 
 from hybridsim.errors import UsageError
-from hybridsim.plot import style
-from hybridsim.plot.sweep_readings import (
+from hybridsim.plot.shared import style
+from hybridsim.plot.sweeps.readings import (
     NO_COLOUR,
     NO_RESULT,
     chosen_names,

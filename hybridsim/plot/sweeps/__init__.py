@@ -1,0 +1,1 @@
+"""This package draws sweeps: lines over one parameter, and maps over two."""
