@@ -47,14 +47,18 @@ class OfRun:
     def run(self, model: Model, previous: OverRun | None) -> OverRun:
         """Return the run; with `warm_start`, the run begins at the end of the previous run."""
         arguments = dict(self.options)
-        heads = {word.partition(".")[0] for word in self.reading_names}
-        if heads == {FINAL}:
+        only_ends = _are_final(self.reading_names)
+        if only_ends:
             arguments = {"keep": Default("nothing"), **arguments}
         if previous is not None:
             arguments["x0"] = _end_of(previous)
         solution = simulate(model, **arguments)
         if not solution.success:
             raise SimulationError(f"{solution.status}: {solution.message}")
+        if solution.t_end <= solution.t_start and not only_ends:
+            raise UsageError(
+                "`t_span` does not run forward in time", remedy="use (t0, t1) with t1 > t0, or measure 'final'"
+            )
         return OverRun(solution, self._quantities)
 
     def read(self, result: OverRun) -> dict[str, float]:
@@ -75,7 +79,7 @@ def of_run(reading_names: Sequence[str], model: Model, options: Mapping[str, Any
     Raises
     ------
     UsageError
-        For unknown names.
+        For unknown names, or a run that is not kept completely.
     """
     states = [state.name for state in model.states]
     if tuple(reading_names) == (FINAL,):
@@ -87,6 +91,8 @@ def of_run(reading_names: Sequence[str], model: Model, options: Mapping[str, Any
                 f"`measure` {beyond!r} of a run is not supported for a MechanicalSystem",
                 remedy="use 'final', or remove `t_span`: the readings are then those of the steady state",
             )
+    if not _are_final(reading_names):
+        _refuse_parts(options)
     quantities = _quantities_of(model)
     known = [f"{FINAL}.{name}" for name in states]
     known += [f"{head}.{name}" for head in OF_QUANTITY for name in quantities]
@@ -115,6 +121,20 @@ def passage_of(word: str) -> Passage | None:
     """
     found = _PASSAGE.fullmatch(word)
     return None if found is None else Passage(found[1], found[2] == ">", parse(found[3]))
+
+
+def _are_final(reading_names: Sequence[str]) -> bool:
+    return all(word.partition(".")[0] == FINAL for word in reading_names)
+
+
+def _refuse_parts(options: Mapping[str, Any]) -> None:
+    """Raise `UsageError` if the options keep only a part of a run."""
+    for name in ("keep", "save"):
+        if options.get(name, "all") != "all":
+            raise UsageError(
+                f"`{name}` is {options[name]!r}, but only 'final' can be measured without the whole run",
+                remedy=f"remove `{name}`, or measure 'final'",
+            )
 
 
 def _quantities_of(model: Model) -> list[str]:

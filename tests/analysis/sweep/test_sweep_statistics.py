@@ -177,3 +177,20 @@ def test_a_reading_that_a_run_does_not_have(reading: str, message: str) -> None:
 def test_a_reading_of_a_run_needs_its_time_span(reading: str) -> None:
     with pytest.raises(hs.UsageError, match="needs `t_span`"):
         hs.sweep(thrown(), {"mu": [0.3]}, ["maximum.x", reading])
+
+
+@pytest.mark.parametrize("name", ["keep", "save"])
+@pytest.mark.parametrize("part", ["nothing", "events", "last-period", 1.0])
+def test_readings_need_the_whole_run(name: str, part: str | float) -> None:
+    """The first passage and the maximum of the last part of a run are not those of the run."""
+    with pytest.raises(hs.UsageError, match=f"`{name}` is {part!r}, but only 'final'"):
+        hs.sweep(decaying(), {"gap": [0.2]}, ["maximum.x"], t_span=(0, 20), **{name: part})
+    assert math.isfinite(one(decaying(), ["final.x"], t_span=(0, 20), keep="events")["final.x"])
+
+
+def test_a_run_backward_in_time_has_only_final_states() -> None:
+    """A run of x' = -x backward in time from t = 1 to t = 0 ends at x = e."""
+    model = hs.Model("falling", parameters={"k": 1.0}, states=[hs.State("x", 1.0, "-k*x")])
+    assert one(model, ["final.x"], t_span=(1, 0))["final.x"] == pytest.approx(math.e, rel=1e-9)
+    found = hs.sweep(model, {"k": [1.0]}, ["maximum.x"], t_span=(1, 0))
+    assert "does not run forward in time" in found.status[0]
