@@ -57,7 +57,8 @@ class OfRun:
             raise SimulationError(f"{solution.status}: {solution.message}")
         if solution.t_end <= solution.t_start and not only_ends:
             raise UsageError(
-                "`t_span` does not run forward in time", remedy="use (t0, t1) with t1 > t0, or measure 'final'"
+                "`t_span` does not run forward in time",
+                remedy="use (t0, t1) with t1 > t0, or measure 'final'",
             )
         return OverRun(solution, self._quantities)
 

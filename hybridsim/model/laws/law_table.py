@@ -8,7 +8,7 @@ from importlib import import_module
 from itertools import pairwise
 from typing import Any
 
-from hybridsim.errors import Place
+from hybridsim.errors import Place, UsageError
 from hybridsim.expr import Expression, parse, substitute
 from hybridsim.model.laws.point_interpolation import CUBIC, LINEAR, texts, texts_of_names, value
 from hybridsim.model.parts.component import Choice, Corner, Guard, Mode
@@ -157,10 +157,15 @@ class LawTable(Declared):
         at, values = fit(at, values, knots)
         return cls(name, at, values, over, "linear")  # type: ignore[arg-type]  # they are converted
 
-    def value(self, argument: float, across: float = 0.0) -> float:
+    def value(self, argument: float, across: float | None = None) -> float:
         """Return the value of the function at one argument, or at both arguments of a table of two."""
         values = self.values
         if self.across is not None:
+            if across is None:
+                raise UsageError(
+                    f"table {self.name} has two arguments, but `across` is missing",
+                    remedy=f"use value(argument, across) with a value of {self.across.text}",
+                )
             values = tuple(value(self.across_at, row, LINEAR, across) for row in self.values)
         return value(self.at, values, self.interpolation, argument)
 

@@ -6,6 +6,7 @@ doi:10.1137/0905021.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from itertools import pairwise
 
@@ -30,7 +31,9 @@ def pieces(at: Sequence[float], values: Sequence[float], way: str) -> list[Piece
 
 
 def value(at: Sequence[float], values: Sequence[float], way: str, argument: float) -> float:
-    """Return the function at an argument; it is constant beyond both ends."""
+    """Return the function at an argument, or NaN at NaN; the function is constant beyond both ends."""
+    if math.isnan(argument):
+        return math.nan
     if argument <= at[0]:
         return values[0]
     if argument >= at[-1]:
