@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import log
+from math import isnan, log, nan
 from pathlib import Path
 
 import numpy as np
@@ -146,3 +146,20 @@ def test_a_negative_coefficient_is_named() -> None:
     )
     with pytest.raises(hs.ModelError, match=r"the slip force at v = 1, T = 80 cannot be -2\.5"):
         model.validate()
+
+
+def test_the_value_of_a_table_of_two_arguments_needs_both() -> None:
+    """Without the second argument, the value at 0 was returned."""
+    table = hs.LawTable(
+        "mu", [0, 1], [[0.5, 0.3], [0.4, 0.2]], interpolation="linear", across="T", across_at=[20, 80]
+    )
+    assert table.value(0.5, 50.0) == pytest.approx(0.35, abs=1e-15)
+    with pytest.raises(hs.UsageError, match="table mu has two arguments, but `across` is missing"):
+        table.value(0.5)
+
+
+@pytest.mark.parametrize("interpolation", ["linear", "cubic"])
+def test_the_value_at_nan_is_nan(interpolation: str) -> None:
+    """A number that is missing has no value."""
+    table = hs.LawTable("mu", [0, 1, 3], [0.5, 0.4, 0.4], interpolation=interpolation)
+    assert isnan(table.value(nan))
