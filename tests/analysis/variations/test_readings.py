@@ -167,6 +167,18 @@ def test_a_forced_oscillator() -> None:
             mp.sin(3 * w) / w - mp.sin(3 * mp.sqrt(k)) / mp.sqrt(k)) / 3, values)  # fmt: skip
 
 
+@pytest.mark.parametrize(
+    ("reading", "value"),
+    [("maximum", 1.5), ("minimum", 0.5), ("amplitude", 0.5), ("mean", 1.0), ("integral", 1.0)],
+)
+def test_readings_of_time_do_not_change(reading: str, value: float) -> None:
+    """The ends of a part of a run are fixed, so a reading of t has the derivative 0, impacts in the part or not."""
+    found = bounced().of(reading, "t", t_span=(0.5, 1.5))
+    assert found.value == pytest.approx(value, rel=1e-15)
+    assert not found.by_start.any()
+    assert not found.by_parameter.any()
+
+
 def test_a_maximum_that_is_held() -> None:
     """A slider that stops stays at x = v0^2/(2 mu g), its largest place, for the rest of the run."""
     values = {"v0": 2.0, "mu": 0.3, "g": 9.81}

@@ -92,11 +92,10 @@ class Readings:
             share = 1.0 / (self._high - self._low) if reading == "mean" else self._sign
             return share * value, share * slope
         (name,) = names
-        extremes = self._extremes(name)
         if reading == "amplitude":
-            (top, by_top), (bottom, by_bottom) = self._extreme(extremes, 1), self._extreme(extremes, -1)
+            (top, by_top), (bottom, by_bottom) = self._extreme(name, 1), self._extreme(name, -1)
             return 0.5 * (top - bottom), 0.5 * (by_top - by_bottom)
-        return self._extreme(extremes, 1 if reading == "maximum" else -1)
+        return self._extreme(name, 1 if reading == "maximum" else -1)
 
     def _extremes(self, name: str) -> Extremes:
         ends = [
@@ -108,8 +107,11 @@ class Readings:
 
     # -- extreme values -------------------------------------------------------------------------------------
 
-    def _extreme(self, extremes: Extremes, sign: int) -> tuple[float, np.ndarray]:
+    def _extreme(self, name: str, sign: int) -> tuple[float, np.ndarray]:
         """Return an extreme value and its derivatives (M,), which are the same at all points with this value."""
+        if name == TIME:
+            return (self._high if sign > 0 else self._low), np.zeros(self._found.width)
+        extremes = self._extremes(name)
         points = extremes.attained(sign)
         slopes = np.array([self._at(extremes, place) for place in points])
         least = _ROUNDING * extremes.size / self._found.own_sizes()
