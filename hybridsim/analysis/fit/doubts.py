@@ -11,7 +11,7 @@ from hybridsim.analysis.fit.residuals import Residuals
 
 _EXPLAINED = 0.5  # of the variance of a quantity; below, the model does not describe the data
 _CORRELATED = 0.5  # correlation of neighbouring residuals; noise of separate samples has about 0
-_ROUNDING = 1e-6  # of a quantity's deviation; smaller residuals are errors of the runs and no noise
+ROUNDING = 1e-6  # of a quantity's deviation; smaller residuals are errors of the runs and no noise
 _FACTOR = 100.0  # between the spreads of measured and simulated values; more is a wrong unit
 _CHI_SQUARE = 2.0  # ratio of the residuals' mean square to the given noise
 
@@ -33,7 +33,7 @@ def doubts(
     for name in residuals.names:
         here = residuals.quantity == name
         spread, size = float(np.std(residuals.measured[here])), float(np.sqrt(np.mean(off[here] ** 2)))
-        if spread == 0.0 or size <= _ROUNDING * spread:
+        if spread == 0.0 or size <= ROUNDING * spread:
             continue
         ratio = spread / max(float(np.std(residuals.measured[here] - off[here])), 1e-12 * spread)
         if ratio > 1e11:
@@ -69,7 +69,7 @@ def is_local(residuals: Residuals, off: np.ndarray) -> bool:
     for name in residuals.names:
         here = residuals.quantity == name
         spread, size = float(np.std(residuals.measured[here])), float(np.sqrt(np.mean(off[here] ** 2)))
-        if size > _ROUNDING * spread > 0.0 and (
+        if size > ROUNDING * spread > 0.0 and (
             1.0 - (size / spread) ** 2 < _EXPLAINED or _correlation(residuals, off, name) > _CORRELATED
         ):
             return True

@@ -133,10 +133,8 @@ def fit(
         more, limited = from_further_guesses(search, effort, stated or spread, is_limited=bool(results))
         results += more
     if not results:
-        failed = residuals.failure
         raise SimulationError(
-            "the runs of the records stop early from every first guess"
-            + (f": {failed.message}" if failed is not None else ""),
+            f"the runs of the records stop early from every first guess: {residuals.failure}",
             remedy="use other guesses or narrower bounds",
         )
     best = min(results, key=lambda result: float(result.cost))

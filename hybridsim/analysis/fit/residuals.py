@@ -15,6 +15,7 @@ from hybridsim.analysis.fit.record import Record
 from hybridsim.analysis.fit.slopes_of_run import NoDerivative, slopes_of_run
 from hybridsim.analysis.fit.unknown import Unknown, start_of
 from hybridsim.analysis.time_budget import Stopwatch
+from hybridsim.errors import ModelError
 from hybridsim.model import Model
 from hybridsim.simulate import simulate
 from hybridsim.solution import Solution
@@ -27,9 +28,12 @@ _JUMP = 1e-6  # of a quantity's deviation: smaller differences of the sides of a
 
 @dataclass(frozen=True)
 class _Point:
-    """The runs of all records with one set of coordinates, and the simulated values (m,) of the samples."""
+    """The runs of all records with one set of coordinates, and the simulated values (m,) of the samples.
 
-    runs: list[Solution]
+    A run is None if the model is wrong with these coordinates.
+    """
+
+    runs: list[Solution | None]
     values: np.ndarray
 
 
@@ -60,7 +64,7 @@ class Residuals:
             bytes, _Point
         ] = {}  # by coordinates: the latest point, and the one of the latest slopes
         self._slopes: tuple[bytes, bool, np.ndarray] | None = None  # coordinates, `is_coarse`, derivatives
-        self.failure: Solution | None = None  # the last run that did not reach the end of its record
+        self.failure = ""  # why the last run did not reach the end of its record
         self.present = [np.isfinite(values) for record in records for values in record.columns.values()]
         counts = [sum(int(np.isfinite(v).sum()) for v in record.columns.values()) for record in records]
         self._rows = np.cumsum([0, *counts])  # first sample of each record, and their number
@@ -115,7 +119,10 @@ class Residuals:
         )
 
     def predicted(self, coordinates: np.ndarray) -> np.ndarray:
-        """Return the simulated value (m,) of each sample, or NaN after the end of a run that stopped early."""
+        """Return the simulated value (m,) of each sample.
+
+        It is NaN after the end of a run that stopped early, and NaN if the model is wrong with these coordinates.
+        """
         return self._point(coordinates).values
 
     def _point(self, coordinates: np.ndarray) -> _Point:
@@ -130,27 +137,39 @@ class Residuals:
             self._points[key] = _Point(runs, np.concatenate(samples))
         return self._points[key]
 
-    def _timed_run(self, number: int, values: Mapping[str, float]) -> Solution:
-        """Simulate the record of the given number, and note the time of the run."""
+    def _timed_run(self, number: int, values: Mapping[str, float]) -> Solution | None:
+        """Simulate the record of the given number and note the time, or return None if the model is wrong.
+
+        With some values between the bounds a model may be wrong, such as with a limit of stick below the slip force.
+        """
         watch = Stopwatch()
-        solution = self.solution(self.records[number], values)
+        try:
+            solution = self.solution(self.records[number], values)
+        except ModelError as error:
+            self.failure = str(error)
+            return None
         self._costs[number].add_run(watch.seconds)
         return solution
 
-    def _samples(self, record: Record, solution: Solution) -> np.ndarray:
+    def _samples(self, record: Record, solution: Solution | None) -> np.ndarray:
         """Return the simulated values (m,) of the samples of one record."""
-        reached, found = record.t <= solution.t_end, []
-        if not reached.all():
-            self.failure = solution
+        reached, found = np.full(len(record.t), False), []
+        if solution is not None:
+            reached = record.t <= solution.t_end
+            if not reached.all():
+                self.failure = solution.message
         for name, measured in record.columns.items():
             column = np.full(len(record.t), np.nan)
-            column[reached] = solution.output(name, record.t[reached])
+            if solution is not None:
+                column[reached] = solution.output(name, record.t[reached])
             found.append(column[np.isfinite(measured)])
         return np.concatenate(found)
 
     def has_jumps(self, coordinates: np.ndarray) -> bool:
         """Return whether a measured quantity jumps in a run, as a friction force does."""
         for record, solution in zip(self.records, self._point(coordinates).runs, strict=True):
+            if solution is None:
+                continue
             times = np.unique([event.t for event in solution.events])
             for name in record.columns if len(times) else ():
                 jumps = np.abs(solution.output(name, times, "+") - solution.output(name, times, "-"))
@@ -186,6 +205,8 @@ class Residuals:
         """Return the derivatives (m, n) of the samples of one record, or None if there are none."""
         record, values, costs = self.records[number], self.values(coordinates), self._costs[number]
         solution = self._point(coordinates).runs[number]
+        if solution is None:
+            return None
         present = {name: np.isfinite(measured) for name, measured in record.columns.items()}
         if not costs.is_exact_cheaper(solution, len(values), lambda: self._timed_run(number, values)):
             self.without[number] = "they take less time"

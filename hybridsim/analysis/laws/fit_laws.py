@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from hybridsim.analysis.compare.comparison_request import mapping
+from hybridsim.analysis.fit.doubts import ROUNDING
 from hybridsim.analysis.fit.fit import fit
 from hybridsim.analysis.fit.record import Record, records_of
 from hybridsim.analysis.fit.residuals import Residuals
@@ -19,7 +20,7 @@ from hybridsim.analysis.laws.compare_laws import Entry, contact_of, models_under
 from hybridsim.analysis.laws.law_fits import LawFit, LawFits
 from hybridsim.arguments import cannot_be, chosen_model, is_row
 from hybridsim.calls import refusing
-from hybridsim.errors import UsageError
+from hybridsim.errors import ModelError, SimulationError, UsageError
 from hybridsim.model import Model, Parameter
 
 _LAWS = "use a list of names, laws, and pairs (law, parameters), such as [('coulomb', {'mu': (0.1, 0.9)})]"
@@ -48,6 +49,8 @@ def fit_laws(
     for n samples and K unknowns. -2 ln L is the sum of ((measured - simulated)/noise)^2 if the noise is given.
     Otherwise it is the sum of n_q ln(S_q/n_q) over the quantities q, with n_q samples and the sum of squares S_q. Each
     quantity then adds one unknown to K. Records that are held out are not fitted, and rank the laws by their residuals.
+    Residuals below 1e-6 of a quantity's standard deviation are errors of the runs. They count as 1e-6 of it, so that
+    of two laws that describe exact data, the one with fewer unknowns is first.
 
     Parameters
     ----------
@@ -73,6 +76,15 @@ def fit_laws(
     -------
     LawFits
         One row per law, the best one first.
+
+    Raises
+    ------
+    UsageError
+        For arguments that do not fit the model, and for too few samples to rank the laws.
+    ModelError
+        If a law is wrong at its first guess.
+    SimulationError
+        If a law cannot be fitted, because its runs stop early from every first guess.
 
     References
     ----------
@@ -100,13 +112,29 @@ def fit_laws(
         label, changed, own = _declared(model, contact, entry)
         if label in [row.label for row in rows]:
             raise UsageError(f"`laws` contains '{label}' twice", remedy="pass each law once")
-        found = fit(changed, fitted, {**shared, **own}, noise=noise, **options)
+        if not {**shared, **own}:
+            raise UsageError(
+                f"the law '{label}' has no unknown",
+                remedy="give bounds for one of its parameters, such as ('coulomb', {'mu': (0.1, 0.9)})",
+            )
+        try:
+            found = fit(changed, fitted, {**shared, **own}, noise=noise, **options)
+        except SimulationError as error:
+            raise SimulationError(
+                f"the law '{label}' cannot be fitted: {error.message}",
+                remedy="use other bounds, or a guess: hs.Unknown(low, high, guess=...)",
+            ) from error
         rows.append(
             LawFit(label, found, criterion(found, noise is not None), _off(found, held) if held else None)
         )
     if not rows:
         raise cannot_be("laws", laws, _LAWS)
-    rows.sort(key=lambda row: row.aicc if row.held_out is None else row.held_out)
+    if not held and len(rows) > 1 and all(math.isinf(row.aicc) for row in rows):
+        raise UsageError(
+            f"{rows[0].fit.samples} samples are too few to rank the laws",
+            remedy="AICc needs two more samples than unknowns and quantities together; use more samples",
+        )
+    rows.sort(key=_rank)
     return LawFits(model.title or model.name, contact, tuple(rows))
 
 
@@ -137,8 +165,22 @@ def _declared(model: Model, contact: str, entry: Any) -> tuple[str, Model, dict[
         own[values_of_law[name]] = unknown
         more.append(Parameter(values_of_law[name], guess))  # type: ignore[arg-type]  # it is converted
     widened = replace(model, parameters=(*model.parameters, *more))
-    ((label, changed),) = models_under(widened, [(law, values_of_law)], contact).items()
+    try:
+        ((label, changed),) = models_under(widened, [(law, values_of_law)], contact).items()
+    except ModelError as error:
+        if not more:
+            raise
+        guesses = ", ".join(f"{each.name} = {each.value.text}" for each in more)
+        raise ModelError(
+            f"{error.message}, with the first guess {guesses}",
+            remedy=f"{error.remedy}; hs.Unknown(low, high, guess=...) sets a guess",
+        ) from error
     return label, changed, own
+
+
+def _rank(row: LawFit) -> tuple[float, float]:
+    """Return the key of a law in the order of the laws. Laws that agree with held-out records are ranked by AICc."""
+    return (0.0 if row.held_out is None else max(row.held_out, ROUNDING)), row.aicc
 
 
 def criterion(found: Fit, is_stated: bool) -> float:
@@ -148,17 +190,26 @@ def criterion(found: Fit, is_stated: bool) -> float:
     if not is_stated:
         count, total = count + len(found.noise), 0.0
         for name in found.noise:
-            parts = [columns[name] for columns in found.residuals if name in columns]
-            squares = np.concatenate(parts)[np.isfinite(np.concatenate(parts))] ** 2
-            total += len(squares) * math.log(max(float(squares.mean()), np.finfo(float).tiny))
+            measured = _present([record.columns for record in found.records], name)
+            off = _present(found.residuals, name)
+            least = max(ROUNDING * float(np.std(measured)), ROUNDING**2 * float(np.abs(measured).max()))
+            total += len(off) * math.log(max(float(np.mean(off**2)), least**2, np.finfo(float).tiny))
     if n <= count + 1:
         return math.inf
     return total + 2.0 * count + 2.0 * count * (count + 1) / (n - count - 1)
 
 
+def _present(columns: Iterable[Mapping[str, np.ndarray]], name: str) -> np.ndarray:
+    """Return the samples of a quantity in all records without the missing ones."""
+    values = np.concatenate([each[name] for each in columns if name in each])
+    return values[np.isfinite(values)]
+
+
 def _off(found: Fit, records: tuple[Record, ...]) -> float:
     """Return the root mean square of the residuals of records, each relative to the deviation of its quantity."""
     residuals = Residuals(found.model, records, {}, found.settings)
+    if not len(residuals.measured):
+        raise UsageError("`held_out` contains no sample", remedy="use a record with measured values")
     off = residuals.measured - residuals.predicted(np.zeros(0))
     if not np.isfinite(off).all():  # a run stopped early
         return math.inf

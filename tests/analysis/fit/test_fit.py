@@ -49,6 +49,31 @@ def test_the_friction_coefficient_of_a_closed_form_is_found() -> None:
     assert found.solution().output("x", t) == pytest.approx(free_decay(t, 0.3), abs=1e-8)
 
 
+def test_values_between_the_bounds_may_be_wrong_for_the_model() -> None:
+    """A block that a spring pulls slides off at k V t = mu_s; the fit passes points with mu_s below mu_k.
+
+    While it slides, the spring force is mu_k + (mu_s - mu_k) cos a + V sqrt(k) sin a, a = sqrt(k) (t - release).
+    """
+    k, V, mu_s, mu_k, t = 4.0, 0.5, 1.2, 0.7, np.linspace(0.0, 1.2, 40)
+    a = math.sqrt(k) * np.maximum(t - mu_s / (k * V), 0.0)
+    force = np.where(a > 0.0, mu_k + (mu_s - mu_k) * np.cos(a) + V * math.sqrt(k) * np.sin(a), k * V * t)
+    model = hs.Model(
+        "pulled",
+        parameters={"mu_s": 1.0, "mu_k": 1.0},
+        states=[hs.State("x", 0, "v"), hs.State("v", 0, "4*(0.5*t - x) - f")],
+        contacts=[hs.Contact("f", "v", 1, "static-kinetic", {"mu_s": "mu_s", "mu_k": "mu_k"})],
+    )
+    found = hs.fit(model, {"t": t, "x": V * t - force / k}, {"mu_s": (0.1, 2.0), "mu_k": (0.1, 2.0)})
+    assert found.values == {"mu_s": pytest.approx(mu_s, abs=1e-7), "mu_k": pytest.approx(mu_k, abs=1e-7)}
+
+
+def test_a_model_that_is_wrong_with_all_values_is_named() -> None:
+    """A negative coefficient of friction at the guess and between the bounds."""
+    t = np.linspace(0.0, 1.0, 60)
+    with pytest.raises(hs.SimulationError, match=r"from every first guess: .*limit cannot be"):
+        hs.fit("free-decay", {"t": t, "x": free_decay(t, 0.3)}, {"mu": (-0.9, -0.1)})
+
+
 def test_errors_are_those_of_linear_regression() -> None:
     t = np.linspace(0.0, 2.0, 30)
     x = 0.7 + 0.3 * t + 0.05 * np.random.default_rng(4).normal(size=30)

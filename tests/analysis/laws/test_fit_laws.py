@@ -49,6 +49,21 @@ def test_the_law_of_the_data_is_first() -> None:
     assert "viscous" in found.report() and "coulomb" in repr(found)
 
 
+NESTED = [("viscous", {"mu": (0.1, 2.0), "c": (-0.5, 0.5)}), ("coulomb", {"mu": (0.1, 2.0)})]
+
+
+@pytest.mark.parametrize("held_out", [None, {"t": T, "x": measured(sigma=0.0)["x"]}])
+def test_exact_data_have_the_law_with_fewer_unknowns(held_out: dict[str, np.ndarray] | None) -> None:
+    """Both laws describe data without noise, and the residuals are errors of the runs.
+
+    The difference of AICc is then that of 2 K + 2 K (K + 1)/(n - K - 1) with K = 3 and 2.
+    """
+    found = hs.fit_laws(slider("coulomb", mu=0.3), measured(sigma=0.0), NESTED, held_out=held_out)
+    assert found.labels == ("coulomb", "viscous")
+    assert found.rows[1].fit.values == {"f_mu": pytest.approx(0.6), "f_c": pytest.approx(0.0, abs=1e-6)}
+    assert found.rows[1].aicc - found.rows[0].aicc == pytest.approx(6 + 24 / 56 - 4 - 12 / 57, rel=1e-9)
+
+
 def test_the_criterion_with_a_given_noise() -> None:
     """The sum of squares over the noise, and no unknown for the noise."""
     found = hs.fit_laws(slider("coulomb", mu=0.3), measured(sigma=0.01), LAWS[1:], noise={"x": 0.02})
@@ -90,6 +105,27 @@ def test_laws_that_cannot_be_fitted_are_refused() -> None:
         hs.fit_laws(model, data, [])
     with pytest.raises(hs.UsageError, match="an entry of `laws`"):
         hs.fit_laws(model, data, [("coulomb", {"mu": (1, 2, 3)})])
+
+
+def test_a_law_without_unknowns_or_runs_is_named() -> None:
+    """A law with fixed parameters, one whose guess has mu_s = 0.3 below mu_k = 0.5, and one without finite runs."""
+    model, data = slider("coulomb", mu=0.3), measured(sigma=0.01)
+    with pytest.raises(hs.UsageError, match="'viscous' has no unknown"):
+        hs.fit_laws(model, data, [LAWS[1], ("viscous", {"c": 1.0})])
+    with pytest.raises(hs.ModelError, match=r"slip force 1 .* guess f_mu_s = 0.3, f_mu_k = 0.5"):
+        hs.fit_laws(model, data, [LAWS[0], ("static-kinetic", {"mu_s": (0.1, 0.5), "mu_k": (0.1, 0.9)})])
+    with pytest.raises(hs.SimulationError, match="'viscous' cannot be fitted: the runs of the records stop"):
+        hs.fit_laws(model, data, LAWS[:1], limits={"steps": 1})
+
+
+def test_too_few_samples_do_not_rank_laws() -> None:
+    """AICc of two unknowns, one parameter and the noise, needs four samples, and held-out records need one."""
+    model, data = slider("coulomb", mu=0.3), measured(sigma=0.01)
+    few = {name: values[5:8] for name, values in data.items()} | {"t": T[5:8]}
+    with pytest.raises(hs.UsageError, match="3 samples are too few to rank the laws"):
+        hs.fit_laws(model, hs.Record(few, t0=0.0), LAWS)
+    with pytest.raises(hs.UsageError, match="`held_out` contains no sample"):
+        hs.fit_laws(model, data, LAWS[1:], held_out={"t": T, "x": np.full(len(T), np.nan)})
 
 
 def test_the_picture() -> None:
