@@ -10,13 +10,13 @@ import hybridsim as hs
 T = np.linspace(0.0, 1.5, 60)
 
 
-def slider(law: str, **parameters: float) -> hs.Model:
+def slider(law: str, load: str | float = 2, **parameters: float) -> hs.Model:
     """A block that slides to rest, x'' = -f."""
     return hs.Model(
         "slider",
         parameters={"v0": 2.0},
         states=[hs.State("x", 0, "v", nominal=1), hs.State("v", "v0", "-f", nominal=1)],
-        contacts=[hs.Contact("f", "v", 2, law, parameters)],
+        contacts=[hs.Contact("f", "v", load, law, parameters)],
     )
 
 
@@ -108,14 +108,14 @@ def test_laws_that_cannot_be_fitted_are_refused() -> None:
 
 
 def test_a_law_without_unknowns_or_runs_is_named() -> None:
-    """A law with fixed parameters, one whose guess has mu_s = 0.3 below mu_k = 0.5, and one without finite runs."""
+    """Fixed parameters, a guess with mu_s = 0.3 below mu_k = 0.5, and a load that becomes negative."""
     model, data = slider("coulomb", mu=0.3), measured(sigma=0.01)
     with pytest.raises(hs.UsageError, match="'viscous' has no unknown"):
         hs.fit_laws(model, data, [LAWS[1], ("viscous", {"c": 1.0})])
     with pytest.raises(hs.ModelError, match=r"slip force 1 .* guess f_mu_s = 0.3, f_mu_k = 0.5"):
         hs.fit_laws(model, data, [LAWS[0], ("static-kinetic", {"mu_s": (0.1, 0.5), "mu_k": (0.1, 0.9)})])
-    with pytest.raises(hs.SimulationError, match="'viscous' cannot be fitted: the runs of the records stop"):
-        hs.fit_laws(model, data, LAWS[:1], limits={"steps": 1})
+    with pytest.raises(hs.SimulationError, match="'coulomb' cannot be fitted: the runs of the records stop"):
+        hs.fit_laws(slider("coulomb", load="1 - t", mu=0.3), data, [("coulomb", {"mu": (0.1, 0.9)})])
 
 
 def test_too_few_samples_do_not_rank_laws() -> None:
