@@ -183,23 +183,27 @@ def page(
     lines = [
         "# Does the advice name the right model?",
         "",
-        f"Does `advise` name the simplest adequate model? Its answer differs from brute force at "
-        f"**{len(wrong) + len(near) + len(dear)}** of {count} random points. At {len(near)} of these points an "
-        f"error is within 0.01 % of the tolerance. At {len(dear)} points `advise` had stopped an adequate model, "
-        f"because it takes far more time than the full model.",
+        "Does `advise` name the simplest adequate model? Its answer differs from a search through all "
+        f"models at **{len(wrong) + len(near) + len(dear)}** of {count} random points. At {len(near)} of "
+        "these points the difference is doubtful, because an error is within 0.01 % of the tolerance. At "
+        f"{len(dear)} points `advise` had stopped an adequate model, because the model takes far more time "
+        "than the full model.",
         "",
-        f"`python docs/studies/advice.py` draws {count} points of the map of the reference model, with F0/N in "
-        f"[0.5, 1.5] and r in [0.05, 2]. For each point `advise` names the simplest model whose steady amplitude of x "
-        f"is within {100 * TOL:g} %. The script then finds this model again by brute force:",
+        f"`python docs/studies/advice.py` draws {count} points in a map of the reference model, with F0/N in "
+        "[0.5, 1.5] and r in [0.05, 2]. For each point `advise` names the simplest model whose steady "
+        f"amplitude of x is within {100 * TOL:g} %. The script then finds this model again by a search "
+        "through all models, called brute force:",
         "",
-        "- The full motion is computed in closed form, from rest until the free vibration is below rounding.",
-        "- Formulas give the amplitude without friction and with equivalent viscous damping.",
-        "- The regularized models are run for the same time.",
+        "- The full motion is computed in closed form, from rest until the free vibration is too small to "
+        "change the result.",
+        "- Formulas give the amplitude of the models without friction and with equivalent viscous damping.",
+        "- The regularized models are run over the same time.",
         "",
-        f"Near the threshold of motion, a model with a friction force smoothed over 1 % of the speed is stiff. At "
-        f"{stopped} points `advise` stopped such a model. The amplitudes of the full model by `advise` and by "
-        f"brute force differ by at most {worst:.1e}. By brute force, the amplitudes of successive periods differ "
-        f"by at most {drift:.1e}. On one thread `advise` took {spent:.0f} s, and brute force {brute:.0f} s.",
+        "A model with a friction force smoothed over 1 % of the speed is stiff near the threshold of "
+        f"motion. At {stopped} points `advise` stopped such a model. The amplitudes of the full model by "
+        f"`advise` and by brute force differ by at most {worst:.1e}. By brute force, the amplitudes of "
+        f"successive periods differ by at most {drift:.1e}. On one thread `advise` took {spent:.0f} s, and "
+        f"brute force {brute:.0f} s.",
         "",
         "| simplest within 1 % | points |",
         "| --- | --- |",
@@ -220,10 +224,10 @@ def page(
         "(../images/advice-map.png)",
         "",
         "*The map shows the answers of `advise` on a grid with N = 40 N. Below F0 = 20 N nothing moves. For "
-        "motions with stops, the simplest adequate model is mostly Karnopp's, with v0 = 1 % of the largest speed."
-        " At some frequencies it is tanh or arctan with this v0. These models take at least as much time as the "
-        "full model. For motions without stops, Den Hartog's formula is exact. Near resonance equivalent viscous "
-        "damping is adequate.*",
+        "motions with stops, the simplest adequate model is usually Karnopp's, with a v0 of 1 % of the "
+        "largest speed. At some frequencies it is tanh or arctan with this v0. These models take at least "
+        "as much time as the full model. For motions without stops, Den Hartog's formula is exact. Near "
+        "resonance equivalent viscous damping is adequate.*",
         "",
     ]
     return "\n".join(lines)

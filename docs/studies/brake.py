@@ -159,15 +159,15 @@ squeal was found, even after a large disturbance.
 The model `models/mode-coupling.toml` is the model of Hoffmann, Fischer, Allgaier and Gaul (2002,
 [doi:10.1016/S0093-6413(02)00254-9](<https://doi.org/10.1016/S0093-6413(02)00254-9>)). A block pressed on a belt moves
 along and across the belt. Friction couples the two motions, because the normal load depends on the motion across the
-belt. The coefficient of friction is constant, so that friction that decreases with the speed is not the cause. The
-script `python docs/studies/brake.py` finds the onset in three ways:
+belt. The coefficient of friction is constant, so the squeal is not caused by friction that decreases with the
+speed. The script `python docs/studies/brake.py` finds the onset in three ways:
 
 - **Closed form.** While the block slides, lambda^2 + c lambda + 2 = +-sqrt(1 - 4 mu/3). Up to mu = 3/4 both motions
-  decay with c/2. At mu = 3/4 their frequencies are equal. For a larger mu one of the motions grows if c is small
-  enough. At the onset lambda = i sqrt(2).
+  decay with the rate c/2. At mu = 3/4 their frequencies are equal. For a larger mu one of the motions grows,
+  if c is small enough. At the onset lambda = i sqrt(2).
 - **Linearization.** `hs.linearize` in the mode `slip-` gives the coefficient at which its `growth` is zero.
 - **Simulation.** The run starts {SHAKE:g} away from steady sliding, and lasts {WATCHED:g} units of time without an
-  event. A matrix maps the states at t to the states at t + {STEP:g}. It is fitted to the run (dynamic mode
+  event. A matrix maps the states at a time t to the states at t + {STEP:g}. It is fitted to the run (dynamic mode
   decomposition, Schmid 2010, [doi:10.1017/S0022112010001217](https://doi.org/10.1017/S0022112010001217)). The largest
   eigenvalue of the matrix gives the growth. This method uses no derivatives of the model.
 
@@ -176,21 +176,21 @@ script `python docs/studies/brake.py` finds the onset in three ways:
 {table}
 
 The last two columns are the largest differences from the closed form over mu = {FRICTION[0]:g} to {FRICTION[-1]:g}.
-These largest differences are at mu = 3/4. Two eigenvalues are equal there. They change with the square root of a
-change of the matrix.
+The differences are largest at mu = 3/4. There two eigenvalues are equal. Two equal eigenvalues change with the
+square root of a change of the matrix.
 
 ![Growth of a small disturbance, and the final amplitude, over the coefficient of friction](../images/brake.png)
 
-The next table is for c = {SQUEALING:g}.
+The next table is for the damping c = {SQUEALING:g}.
 
 | mu | growth, closed form | `linearize` | simulation | final amplitude, disturbance of {SHAKE:g} | of {LARGE:g} |
 | --- | --- | --- | --- | --- | --- |
 {shown}
 
-Simulation also gives the final motion. At mu = {FRICTION[squeals][0]:.2f} and above, the disturbance grows until the
-block sticks to the belt in every cycle. Just above the onset the final amplitude is already
-{sizes[SHAKE][squeals][0]:.2f}. A disturbance of {LARGE:g} is larger than the amplitude of these limit cycles. After
-such a disturbance the motion settles to the limit cycle too. Below the onset no squeal was found.
+The simulation also gives the final motion. At mu = {FRICTION[squeals][0]:.2f} and above, the disturbance grows
+until the block sticks to the belt in every cycle. Just above the onset the final amplitude is already
+{sizes[SHAKE][squeals][0]:.2f}. A disturbance of {LARGE:g} is larger than the amplitude of the limit cycle. After
+such a disturbance the motion settles to the limit cycle too. Below the onset even such a disturbance causes no squeal.
 """
 
 

@@ -124,22 +124,22 @@ def page(rows: dict[int, dict[str, tuple[float, float, float]]], load: float) ->
     if HAS_HEYOKA:
         verdict = f"""
 hybridsim is faster than heyoka for n = {ahead or "none"}{but}. heyoka expands the series of the whole chain at every
-event. The code of heyoka is compiled for this chain (this time is not counted), and its event callbacks are Python
-functions. The kernels of hybridsim are compiled once for all systems.
+event. heyoka compiles its code for this chain, and the table does not include the time for this. The event
+callbacks of heyoka are Python functions. The kernels of hybridsim are compiled once for all systems.
 """
     heads = " | ".join(names)
     return f"""# A chain of blocks: what an event costs
 
-How does the cost of an event grow with the number of blocks n? In hybridsim the time per event, with a share of the
-time of all steps, grows as n^{exponent:.2f}.
+How does the cost of an event grow with the number of blocks n? In hybridsim the time per event grows as
+n^{exponent:.2f}. This time includes a share of the time of all steps.
 
 `hs.chain_on_belt(n)` is a chain of blocks of mass 1 on a belt of speed {BELT}. The leaf springs have a stiffness of
 {LEAF}, and the coupling springs of {COUPLING}. The friction is 1/(1 + {DELTA:g}|v|), and the initial positions are
-random. `python docs/studies/chain.py` runs the methods in turns and takes the least time of each method. Every run
+random. `python docs/studies/chain.py` runs the methods in turns, and takes the shortest time of each method. Every run
 finished. {machine()}
 
-When the study began, other programs kept {load:.1f} of {os.cpu_count()} processors busy. For this reason all times
-are longer, and ratios are uncertain by a factor of two.
+When the study began, other programs kept {load:.1f} of {os.cpu_count()} processors busy. All times are longer for
+this reason, and ratios of times are uncertain by a factor of two.
 
 The table gives milliseconds per unit of simulated time. The number in brackets is the largest error of a state after
 {JUDGED:g} units of time. The reference is a run of hybridsim at rtol 1e-13.
@@ -153,7 +153,7 @@ The table gives milliseconds per unit of simulated time. The number in brackets 
 After an event hybridsim restarts only the few neighbouring blocks whose series changes by more than a tenth of the
 tolerance. At the end of a step it expands the series of all blocks, once for all events of the step. The other
 methods restart all blocks at each event. For these methods the cost of an event is therefore proportional to n.
-{verdict} The series methods control their error. RK4 with h = {STEP:g} has no error control. When RK4 releases a
+{verdict} hybridsim and heyoka control their error. RK4 with h = {STEP:g} has no error control. When RK4 releases a
 block, it changes the speed of the block by 1e-14, so that the block does not stop again at once. The program siconos
 was not run. PyPI has no wheel of siconos (`pip download siconos` finds no version).
 """

@@ -143,7 +143,7 @@ def pairs(seeds: list[int]) -> tuple[Counter[str], Counter[tuple[str, str]]]:
 HEAD = """# Combined forms
 
 Do runs of models that combine many forms agree with an independent judge? Of {runs} runs {agree} agree and {differ}
-differ. The tables below list the others.
+differ. The tables below list the other runs.
 
 `python docs/studies/combined_forms.py` draws whole models at random. It compares each run with an independent solver,
 the judge, that shares no code with hybridsim. The models combine these forms:
@@ -151,31 +151,33 @@ the judge, that shares no code with hybridsim. The models combine these forms:
 - Every number is a literal, a parameter, an expression of parameters, a definition, a discrete state or an input.
 - Guards, loads, gaps, laws, rates, monitors and resets contain `max`, `min`, `abs` and conditionals. Each of these
   functions is written in one of several equivalent ways.
-- Forces, loads and belts change at known times. The changes are single conditions, Boolean combinations, tables and
-  waves.
-- Runs start on guards, at rest and on corners. Schedules, clocks, impacts, contacts, relays and monitors meet at one
-  instant.
+- Forces, loads and speeds of belts change at known times. The changes are single conditions, Boolean combinations,
+  tables and waves.
+- Runs start on guards, at rest and on corners. Schedules, clocks, impacts, contacts, relays and monitors have
+  events at the same instant.
 - Parts of a model depend on states of other parts. A definition may replace a part of an expression.
 - Names, the order of declaration, the scale and sign of states, and the origin of time are also random. One run in
   ten is stopped in the middle and resumed.
 
-Each model with a set of numbers runs by one integrator of hybridsim, or by the default, and by another random
-integrator. The first structures are selected so that rare pairs of forms occur. Each of these structures is the best
-of {pool} random structures. It has the most pairs that are in fewer than {enough} structures so far. The other
-structures are not selected. All pairs of forms are possible, because every form belongs to a part of a model, and
-parts are drawn independently.
+Each model with a set of numbers runs twice. One run is by a named integrator of hybridsim or by the default, and
+the other run is by another random integrator. The first structures are selected so that rare pairs of forms occur
+often enough. Each of these structures is the best of {pool} random structures. The best structure has the most
+pairs that are in fewer than {enough} structures so far. The other structures are not selected. All pairs of forms
+are possible, because every form belongs to a part of a model, and parts are drawn independently.
 
-*The judge* (`tests/reference/combined`) reads an abstract form of the model, and not the model file. It computes the
-motion by Taylor series in each configuration. It finds zeros by dense sampling and bisection. At an instant it tries
-every combination of modes and sides. Those combinations are admissible whose conditions are true just after the
-instant. The judge finds impulses by enumeration too. If a run disagrees, the judge computes the motion again in 40
-digits. A run is compared only as long as the motion is certain. The comparison ends if a guard approaches zero within
-1e-6 and turns back. It also ends at an instant at which the rules permit several motions.
+*The judge* (`tests/reference/combined`) is an independent solver. It reads an abstract form of the model, and not
+the model file. It computes the motion by Taylor series for each combination of modes. It finds zeros by dense
+sampling and bisection. At an instant with an event it tries every combination of modes and sides. A combination is
+admissible if its conditions are true just after the instant. The judge also finds impulses by trying all
+combinations. If a run disagrees, the judge computes the motion again in 40 digits. A run is compared only as long
+as the motion is certain. The comparison ends if a guard approaches zero within 1e-6 and turns back. The comparison
+also ends at an instant at which the rules permit several motions.
 
-A run *agrees* under two conditions. At each of {points} times all states and discrete states differ from those of the
-judge by at most {allowed:g} of the size of the motion. All monitors fire as often as with the judge. Two kinds of
-runs are counted separately. The first kind stops with a named status before the motion of the judge ends. The second
-kind is wrong, but has a warning that a jump inside a mode was integrated without location.
+A run *agrees* under two conditions. First, at each of {points} times all states and discrete states differ from
+those of the judge by at most {allowed:g} of the size of the motion. Second, all monitors fire as often as with the
+judge. Two kinds of runs are counted separately. A run of the first kind stops with a named status before the motion
+of the judge ends. A run of the second kind is wrong, but warns that a jump inside a mode was integrated without
+location.
 
 """
 
@@ -199,7 +201,7 @@ def page(done: list[dict[str, Any]], draws: int) -> str:
     )
     instants = sum(r.get("instants", 0) for r in runs)
     counts = f"There are {len(seeds)} structures with {draws} sets of numbers each, and each set runs by two "
-    counts += "integrators. Without runs that have no model or no certain motion, these are "
+    counts += "integrators. Some of these runs have no model or no certain motion. The others are "
     counts += f"{len(runs)} runs, with {instants} instants of events."
     out += textwrap.fill(counts, 118) + "\n\n"
     out += "| result | runs |\n| --- | --- |\n"

@@ -92,38 +92,39 @@ def main() -> None:
 Are coupled contacts decided correctly? In {decided} decisions of random systems, {inadmissible} were not admissible.
 
 `docs/studies/coupled_contacts.py` draws random mechanical systems of 2 to 12 coordinates and 2 to 5 contacts. The
-mass and stiffness matrices are dense. The direction of a contact has one, two or all coordinates. The bases are at
-rest or move. The applied force is harmonic. Each run lasts {SPAN:g} units of time at rtol {RTOL:g}.
+mass and stiffness matrices are dense. The direction of a contact contains one, two or all coordinates. The bases
+are at rest or move. The applied force is harmonic. Each run lasts {SPAN:g} units of time at rtol {RTOL:g}.
 
-At each event the script tries all combinations of stick, slip forward and slip backward for the contacts at rest. For
-each combination it computes the accelerations, the forces and two derivatives of them. It solves the whole system of
-equations in 40 digits, without a Delassus operator and without pivoting. The decision of the run must be among the
-admissible combinations. Each system also runs with its coordinates and contacts in {ORDERS} other orders of
-declaration.
+At each event the script tries all combinations of stick, slip forward and slip backward for the contacts at rest.
+For each combination it computes the accelerations, the forces and two time derivatives of the forces. It solves the
+whole system of equations in 40 digits, with none of the methods of hybridsim (Delassus operator and pivoting). The
+decision of the run must be among the admissible combinations. Each system also runs with its coordinates and
+contacts in {ORDERS} other orders of declaration.
 
 | law | systems | instants decided | not admissible | several admissible | orders apart: median | largest |
 | --- | --- | --- | --- | --- | --- | --- |
 {table}
 
-If static and kinetic friction are equal, the motion is unique. The check sometimes counts several combinations,
-because it uses only two derivatives, or none for redundant sets of contacts. It also treats values below 1e-9 as
-zero. With static friction above kinetic friction, several outcomes may be possible. The run begins with stick in all
-contacts that may stick, and releases contacts whose force exceeds the limit. Differences between orders are due to
-rounding. They grow because the motion separates neighbouring states.
+If static and kinetic friction are equal, the motion is unique. The check sometimes counts several combinations
+nevertheless. It uses only two derivatives, or none for redundant sets of contacts. It also treats values below 1e-9
+as zero. With static friction above kinetic friction, several outcomes may be possible. The run begins with stick in
+all contacts that may stick, and then releases the contacts whose force exceeds the limit. Differences between the
+orders of declaration are due to rounding. They grow because motions from neighbouring states move apart.
 
 ## Work and energy
 
-Over each run the change of v.Mv/2 + q.Kq/2 must equal the work of the forcing minus the work of dampers and friction.
-Each work is an integral over the dense output, by Gauss-Legendre quadrature. It has 20 nodes between any two
-successive times at which a series begins or an event happens. The table gives the residual of this balance, relative
-to the work of friction. The work of friction is the integral of the sum of f (w.v - base).
+Over each run the change of the energy v.Mv/2 + q.Kq/2 must equal the work of the forcing minus the work of dampers
+and friction. Each work is an integral over the dense output, by Gauss-Legendre quadrature. The quadrature has 20
+nodes between any two successive times at which a series begins or an event happens. The table gives the difference
+between the two sides, relative to the work of friction. The work of friction is the integral of the sum of f (w.v -
+base).
 
 | law | residual: median | largest | 16 nodes instead of 20 change the work of friction by at most |
 | --- | --- | --- | --- |
 {energies}
 
-The runs are at rtol {RTOL:g}. If the friction force depends on the speed, its work has the error of the run. For the
-laws `coulomb` and `static-kinetic`, its work has only rounding errors.
+The runs are at rtol {RTOL:g}. If the friction force depends on the speed, the computed work has the error of the
+run. For the laws `coulomb` and `static-kinetic`, the computed work has only rounding errors.
 """,
         encoding="utf-8",
     )

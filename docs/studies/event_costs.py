@@ -134,19 +134,21 @@ def page(rows: list[str], never: list[float]) -> str:
     return f"""# Cost of events
 
 How much do monitors, clocks, tables and impacts add to the time of a run? With a linear monitor that never fires, a
-run takes {min(never):.2f} to {max(never):.2f} times as long.
+run takes {min(never):.2f} to {max(never):.2f} times as long as without it.
 
 `exact`, `taylor` and `dop853` run from event to event in compiled code, in which an ordinary event takes
-microseconds. Python handles events that need a message or a joint decision, in about a millisecond. Three rows of the
-table have such events:
+microseconds. Python handles events that need a message or a joint decision, in about a millisecond. Three rows of
+the table have events of this kind:
 
-- A quadratic monitor has no closed form in `exact`.
-- A monitor of the sliding speed is zero at the same time as the guard of the contact. Both are decided together.
+- A quadratic monitor is not available in the closed form of `exact`.
+- A monitor of the sliding speed is zero at the same time as the guard of the contact. The monitor and the contact
+  are then decided together.
 - At an impact all contacts that are struck together are decided together.
 
-`python docs/studies/event_costs.py` writes this page. The table gives medians of processor time in one process. Runs
-with and without the part in the first column alternate. The monitors are added to 100 periods of the system of the
-paper. The clock and the table drive an oscillator. A falling body bounces without loss. {machine()}
+`python docs/studies/event_costs.py` writes this page. The table gives medians of processor time in one process. A
+run with the part in the first column and a run without this part alternate. The monitors are added to 100 periods
+of the system of He et al. The clock and the table drive an oscillator. In the rows with impacts a falling body
+bounces without loss. {machine()}
 
 {table}
 """

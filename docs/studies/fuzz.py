@@ -83,12 +83,12 @@ TEXT = """# Wrong files, wrong command lines
 
 Does a faulty model file or command line ever cause an internal error? {verdict} The script `docs/studies/fuzz.py` ran
 {files} model files and {lines} command lines. They contain typical mistakes of users, editors and scripts, and
-deliberate attacks. No case may cause an internal error, a traceback, a warning of a library, a hang or an unwanted
-file. No text of a file may run as code.
+deliberate attacks. No case may cause an internal error, a traceback, a warning of a library, a hang or a file that
+the user did not request. No text of a file may run as code.
 
 ## Model files
 
-Each file is a model of the package or a scene of the atlas with one to a few changes:
+Each file is a model of the package or a scene of the atlas. One to a few of these changes are applied:
 
 - A line is lost, doubled or moved.
 - A number is far out of range (5e-324, 1e308, a thousand digits).
@@ -109,9 +109,9 @@ than {limit:g} seconds is a *hang*. All other endings in the table are statuses 
 
 ## Command lines
 
-Each command line is a correct command with one to a few changes. A word is lost, doubled, moved, misspelt or
-replaced. Values have the faults listed above. Other values are names of devices, of folders and of missing files. A
-command that runs longer than {commanded:g} seconds is interrupted as by Ctrl-C.
+Each command line is a correct command to which one to a few changes are applied. A word is lost, doubled, moved,
+misspelt or replaced. Values have the faults that are listed above. Some values are replaced by names of devices, of
+folders and of missing files. A command that runs longer than {commanded:g} seconds is interrupted as by Ctrl-C.
 
 | ending | command lines |
 | --- | --- |
@@ -121,7 +121,7 @@ The exit codes are [those of the reference](../reference/cli.md).
 
 ## Detection of faults
 
-Each case runs in a process that is observed from inside:
+Each case runs in a process that records what the case does:
 
 - The changed texts contain the names of a function and of a module. If this function is called or the module
   imported, the process records it.
@@ -130,10 +130,10 @@ Each case runs in a process that is observed from inside:
 These results are faults: an exception, a warning, an undocumented exit code, a failure without a message, output that
 is not JSON under `--json`, and a hang.
 
-All faults of earlier runs are fixed, and each has a test in `tests/fuzz/test_found.py`. The cause of most faults was
-a number at the end of the range of floating-point numbers, whose square or quotient is infinite. In one fault the
-bound of a guard was not a number, so that the search for a zero never ended. In other faults a message contained a
-very long word. The tests run a few cases of each kind.
+All faults that earlier runs found are fixed, and each has a test in `tests/fuzz/test_found.py`. The cause of most
+faults was a number at the end of the range of floating-point numbers, whose square or quotient is infinite. In one
+fault the bound of a guard was not a number, so that the search for a zero never ended. In other faults a message
+contained a very long word. The tests run a few cases of each kind.
 """
 
 

@@ -165,22 +165,23 @@ Does hybridsim ever miss a zero of a guard? Of {zeros} single zeros of {count} r
 The tables below show how many pairs of zeros were found or reported.
 
 `python docs/studies/guards.py` draws {count} random guards, half for `exact` and half for `taylor` (rtol {rtol:.0e}).
-It compares every mode change of the runs with an independent solution, the oracle. The oracle has each guard g in
-closed form for the given floating-point numbers. It computes depths and zeros in 40 digits.
+It compares every mode change of the runs with an independent solution, which is called the oracle. The oracle has
+each guard g in closed form, for exactly the numbers that the run uses. It computes depths and zeros in 40 digits.
 
-A model has two modes. The guard of one mode is g, and the guard of the other mode is -g. The mode changes at each
-zero of g. The next segment starts at this zero, with a guard that is zero by definition.
+A model has two modes. The guard of one mode is g, and the guard of the other mode is -g. Therefore the mode changes
+at each zero of g. The next segment of the run starts at this zero, with a guard that is zero by definition.
 
 - For `exact` the guard g is a random combination of the terms that linear modes can produce. These are polynomials
   up to degree six, two waves, a damped driven oscillator, decays with waves, and t exp(-t) as a function of time.
-- For `taylor` the guard is a product of up to five factors with a zero. They are polynomial or trigonometric, in t or
-  in a state. The product is multiplied by positive functions. The model also has a nonlinear state.
+- For `taylor` the guard is a product of up to five factors with a zero. The factors are polynomial or
+  trigonometric, in t or in a state. The product is multiplied by positive functions. The model also has a nonlinear
+  state.
 
-Most guards have one or two *close extremes*, at a given distance from zero, which is called the depth. If g turns
-back beyond zero, there is a pair of zeros. If g turns back before zero, there is a near miss. Depths are spread
-evenly over the decades from 1e-17 to 1e-1 of the size of the guard. For `exact` the size is the largest sum of the
-absolute values of the terms. For `taylor` it is the largest value of the guard. Zeros closer than 1 % of the span
-count as a pair.
+Most guards have one or two *close extremes*. The distance of such an extreme from zero is called the depth. If g
+turns back after it has passed zero, there is a pair of zeros. If g turns back before it reaches zero, there is a
+near miss. The depths of the extremes are spread evenly over the decades from 1e-17 to 1e-1 of the size of the
+guard. For `exact` the size is the largest sum of the absolute values of the terms. For `taylor` it is the largest
+value of the guard. Zeros closer than 1 % of the span count as a pair.
 
 ## Zeros
 
@@ -188,11 +189,11 @@ count as a pair.
 | --- | --- | --- | --- | --- | --- | --- |
 """
 PAIRS = """
-A zero of a pair is *late* if its error exceeds {late:.0e} of the span. It must also be larger than the effect of the
-error of the guard. The error of the guard is 1e-13 of its size for `exact`, and a tenth of rtol for `taylor`. A
-single zero is *late* if its error exceeds 1e-10 of the span and 1e-10 of the size divided by the slope. If the error
-is more than ten times as large, the zero counts as missed, and the event as spurious. *Off by* is the error in time
-of single zeros, multiplied by the slope and divided by the size.
+A zero of a pair is *late* if its error exceeds {late:.0e} of the span. This error must also be larger than the
+effect of the error of the guard. The error of the guard is 1e-13 of its size for `exact`, and a tenth of rtol for
+`taylor`. A single zero is *late* if its error exceeds 1e-10 of the span and 1e-10 of the size divided by the slope.
+If the error is more than ten times as large as these limits, the zero counts as missed, and the event as spurious.
+*Off by* is the error in time of single zeros, multiplied by the slope of the guard and divided by its size.
 
 ## Pairs, by depth over size
 
@@ -205,8 +206,8 @@ A pair is *found* if both zeros are found. It is *flagged* if no zero is found, 
 MISSES = """
 ## Near misses, by depth over size
 
-A near miss is *passed* if there is neither an event nor a report. It is *crossed* if the run has a false pair of
-events.
+A near miss is *passed* if there is neither an event nor a report. It is *crossed* if the run has two events,
+although there is no zero.
 
 | depth | exact passed | flagged | crossed | taylor passed | flagged | crossed |
 | --- | --- | --- | --- | --- | --- | --- |
@@ -214,15 +215,15 @@ events.
 TAIL = """
 ## Error bounds
 
-The deepest flagged pair has a depth of {exact:.1e} of the size for `exact`, and {taylor:.1e} for `taylor`. The
-compiled searches use these error bounds:
+The deepest pair that was flagged and not found has a depth of {exact:.1e} of the size for `exact`, and {taylor:.1e}
+for `taylor`. The compiled searches use these error bounds:
 
 - For `exact` the bound is (16 + 2 J + 2 w s) 2^-53 of the size. J is the number of modal coordinates, w the largest
   rate, and s the time since the last event. In this study the bound is about 4e-15.
-- For `taylor` the bound is 2 (|a_N| + |a_N-1|) + 8 2^-53 sum |a_k|, with the series of the guard on the step. It is
-  at most 6 rtol = {bound:.0e} of the largest value of the guard.
+- For `taylor` the bound is 2 (|a_N| + |a_N-1|) + 8 2^-53 sum |a_k|. The a_k are the coefficients of the guard's
+  series on the step. It is at most 6 rtol = {bound:.0e} of the largest value of the guard.
 
-No pair whose depth exceeds ten times the bound is lost. Of the other pairs {lost}.
+No pair whose depth exceeds ten times the bound is lost. Every other pair {lost}.
 
 Run `python docs/studies/guards.py [guards]` to repeat the study. It takes {minutes:.0f} minutes on one core.
 """
@@ -241,7 +242,7 @@ def page(count: int, tallies: dict[str, Tally], minutes: float) -> str:
     silent = sum(
         n for a in tallies.values() for (_, fate), n in a.pairs.items() if fate in ("silent", "torn")
     )
-    lost = "each is found or flagged"
+    lost = "is found or flagged"
     if silent:
         lost += (
             f", except {silent} that the table counts as lost, below the rounding of the terms of the guard"

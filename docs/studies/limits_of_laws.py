@@ -221,12 +221,12 @@ inverse of a contact stiffness. `python docs/studies/limits_of_laws.py` runs the
 | --- | --- | --- | --- | --- |
 {about}
 
-The relative width e is v0 over the largest speed, or the deflection mu N/stiffness over the largest displacement. The
-error is the largest error of x over the run.
+The relative width e is v0 over the largest speed. For a contact stiffness it is the deflection mu N/stiffness over
+the largest displacement. The error is the largest error of x over the run.
 
 ![Error over the width of a law, six laws in three scenes](../images/limits-of-laws.png)
 
-The table compares the theoretical order with the observed order, both over the smallest decade of e.
+The table compares the theoretical order with the observed order. Both are for the smallest decade of e.
 
 | law | {heads} |
 | --- | {" | ".join(["---"] * (3 * len(every)))} |
@@ -241,23 +241,23 @@ dominates.
 | --- | --- | --- | --- |
 {forms}
 
-**Release.** Let s be the time since the applied force passed mu N, and let the force be mu N + r s. With the
+**Release.** Let s be the time since the applied force exceeded mu N, and let the applied force be mu N + r s. With the
 set-valued law m v = r s^2/2. Let d be the difference between mu N and the friction force of another law. Then m v' =
-r s + d. Near s = 0 there is an interval in which d and r s have one order of magnitude. The error is the additional
-velocity at the end of this interval.
+r s + d. Near s = 0 there is an interval in which d and r s have the same order of magnitude. The error is the
+additional velocity at the end of this interval.
 
 - `tanh`: d = 2 mu N exp(-2 v/v0). Then v is of size v0, and s is of size v0^(1/2). The velocity also has a factor
   log(1/v0), because d must decrease from mu N to r s.
 - `arctan`: d = (2/pi) mu N v0/v. The velocity v is of size s^2. Then s^3 is of size v0, and v is of size v0^(2/3).
-- `dahl`, `lugre`: d = mu N exp(-sigma x/(mu N)). Then x is of size 1/sigma, s of size sigma^(-1/3) and v of size
-  sigma^(-2/3). The damping of the bristles is sqrt(sigma_0 m) v d/(mu N), which is smaller than d by a factor of
-  sigma^(-1/6).
+- `dahl`, `lugre`: d = mu N exp(-sigma x/(mu N)), with the stiffness sigma. Then x is of size 1/sigma, s of size
+  sigma^(-1/3) and v of size sigma^(-2/3). The damping of the bristles is sqrt(sigma_0 m) v d/(mu N), which is
+  smaller than d by a factor of sigma^(-1/6).
 - `jenkins`: d = 0 when the force reaches mu N. The error is the vibration of the body on the spring, which begins at
   each stop. The vibration causes slip when the applied force grows. At the release the vibration of x is of size 1/k.
-- `karnopp`: the release is located. At the stop before, the body sticks too early by v0/a, where a is its
-  deceleration. The distance to the true position of the stop is v0^2/(2 a).
+- `karnopp`: the release is located exactly. At the stop before the release, the body sticks too early by the time
+  v0/a, where a is its deceleration. The distance to the true position of the stop is v0^2/(2 a).
 
-**Reversal.** The friction force changes by 2 mu N. With the set-valued law it changes at once.
+**Reversal.** The friction force changes by 2 mu N. With the set-valued law the force changes at once.
 
 - `tanh`, `arctan`, `karnopp`: the change takes the time v0/a. The velocity has an error of the order of v0 during
   this time. With `arctan` the change takes longer, and the integral of v0/(a s) over s is of size v0 log(1/v0).

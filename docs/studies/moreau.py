@@ -213,14 +213,15 @@ At which order of the step does time stepping converge? All orders of `moreau` l
 
 `moreau` does not locate events, and has its own mode decisions. `python docs/studies/moreau.py` runs ten scenes with
 {levels} step sizes. Each step size is half of the previous one. The reference is `exact` or `taylor` at rtol 1e-11,
-which locate every event. The place of an impact within its step is random, so that single errors scatter. Each error
+which locate every event. The place of an impact within its step is random, so single errors scatter. Each error
 is therefore a mean over {neighbours} neighbouring step sizes.
 
 ![Errors over the step](../images/moreau.png)
 
 For positions the table gives the largest error at any time. Velocities jump. If a jump is one step late, the error
-during this step is the whole jump. For velocities the table therefore gives the mean error over the time. Both errors
-are relative to the largest value, and are for the finest step. The order is the slope over all steps.
+of the velocity during this step is the whole jump. For velocities the table therefore gives the mean error over the
+time. Both errors are relative to the largest value, and the table gives them for the finest step. The order is the
+slope of the error over all steps.
 
 | dry friction | changes of mode | order of x | order of v (L1) | finest step | error of x | error of v | seconds |
 | --- | --- | --- | --- | --- | --- | --- | --- |
@@ -233,8 +234,8 @@ are relative to the largest value, and are for the finest step. The order is the
 `dfcs` is of second order. In the step of a stop, the friction impulse removes exactly the momentum of the body. At a
 release the friction force does not jump, because static and kinetic friction are equal. At a reversal without a stop
 the body sticks for one step. This error is of first order (`free-decay`). A force that depends on the speed is
-evaluated at the end of the step. This error is of first order too (`belt`). The scenes have no grazing impacts. The
-time of a grazing impact, and therefore its error, depends on the square root of a parameter.
+evaluated at the end of the step. This error is of first order too (`belt`). The scenes have no grazing impacts. At
+a grazing impact the error depends on the square root of a parameter, because the time of the impact does.
 
 - *vibrating table*: a ball is thrown repeatedly. Each flight ends in an accumulation of bounces, and then in rest.
 - *thrown block*: each impact loads the friction. The block slides after the last impact, and then sticks.
@@ -248,8 +249,8 @@ time of a grazing impact, and therefore its error, depends on the square root of
 `hs.chain_on_belt(n, gap={gap:g})` has n blocks of mass 1 on a belt. The friction of each block is 1/(1 + 3|v|).
 Springs connect neighbouring blocks. If a spring is compressed by {gap:g}, its blocks collide with e = 0.5. The run
 lasts {span:g} units of time in steps of {step:g}. Friction and impacts act on the same blocks, so that each step
-solves one problem with n + (n - 1) contacts. A step is unsettled if its impulses did not converge to 1e-12 of the
-largest impulse. Times are on one core of a machine that also ran other programs.
+solves one problem with n + (n - 1) contacts. A step counts as unsettled if its impulses did not converge to 1e-12
+of the largest impulse. Times are on one core of a machine that also ran other programs.
 
 | n | status | unsettled | bounces | changes of mode | us per step | sweeps per step | least gap |
 | --- | --- | --- | --- | --- | --- | --- | --- |
@@ -259,10 +260,10 @@ largest impulse. Times are on one core of a machine that also ran other programs
 | --- | --- | --- | --- | --- | --- |
 {works}
 
-With theta = 1/2 the works of a step add up exactly to the gain of kinetic and elastic energy. The missing energy is
-rounding. Friction and impacts do not add energy, because their sums are negative. A contact becomes active in the
-first step in which its gap would close by the middle of the step. A gap may therefore become negative, by at most 1 -
-e/2 times the distance of a step. No gap in this study is smaller.
+With theta = 1/2 the sum of all works in a step equals the gain of kinetic and elastic energy. The missing energy in
+the table is rounding. Friction and impacts do not add energy, because the sums of their works are negative. A
+contact becomes active in the first step in which its gap would close by the middle of the step. A gap may therefore
+become negative, by at most 1 - e/2 times the distance of a step. No gap in this study is below this limit.
 """
 
 

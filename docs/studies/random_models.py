@@ -142,32 +142,33 @@ def proportions(count: int, seed: int) -> dict[str, list[float]]:
 
 HEAD = """# Random models against references
 
-Are runs as accurate as the tolerance requests? Of {runs} runs of random models, {faults} exceed the allowed error.
+Are the errors of runs as small as the tolerance requests? Of {runs} runs of random models, {faults} exceed the
+allowed error.
 
 `python docs/studies/random_models.py` runs 200 random structures with {draws} draws of parameters and initial values
 each. It compares every run with a reference at four times. These are the end of the run and three times between
 steps, which test the dense output.
 
 - There are 100 dense linear systems x' = A x + f phi(t) of one to eight states. In some systems the matrix A is
-  generic or oscillatory (about ten turns). In others it is defective, with chains of equal eigenvalues after an
-  integer transformation without rounding. In others it differs from a defective matrix by 1e-4 to 1e-15. Stiff
-  systems have ratios of rates from 10 to 1e4, and from 1e4 to 1e8 (only for `exact` and `rodas5p`). The forcing phi
-  is zero, constant, a polynomial, an exponential, a sine, or t exp(-e t) cos(w t). The reference is a matrix
-  exponential in integers of {bits} bits.
+  generic, or oscillatory with about ten turns. In others A is defective. Its chains of equal eigenvalues are
+  transformed by integers, without rounding. In others it differs from a defective matrix by 1e-4 to 1e-15.
+  In stiff systems the ratio of the rates is from 10 to 1e4, or from 1e4 to 1e8 (only for `exact` and `rodas5p`). The
+  forcing phi is zero, constant, a polynomial, an exponential, a sine, or t exp(-e t) cos(w t). The reference
+  is a matrix exponential in integers of {bits} bits.
 - There are 80 systems of one to four states with random smooth expressions (sums, products, quotients, roots, exp,
   sin, cos, tanh, atan). The reference is a Taylor series in integers, with about 18 correct digits.
 - There are 20 coupled stiff nonlinear systems of two to four states that approach known waves. The ratios of rates
   are from 10 to 1e4 in 14 of them, and from 1e4 to 1e8 in 6 of them (`rodas5p`).
 
 The error is the largest error of all states, relative to the largest state of the run, in units of rtol. The
-tolerance is {asked}. `exact` has no tolerance. The unit of its error is a sum of two parts. The first part is 2^-53
-of the largest state. For the second part, all numbers of the model change by a relative 2^-53. The part is the
-largest change of the motion in three trials. No floating-point computation can avoid an error of this size. The
-change of basis in `exact` may multiply it by a hundred.
+tolerance is {asked}. `exact` has no tolerance. The error of `exact` is measured in another unit, a sum of two
+parts. The first part is 2^-53 of the largest state. For the second part, all numbers of the model are changed by a
+relative 2^-53. This part is the largest change of the motion in three trials. No floating-point computation can
+avoid an error of this size. The change of basis in `exact` may multiply such an error by a hundred.
 
 A run is *within* the tolerance if its error is at most {within:.0f} units. For `exact` the limit is {exact:.0e}
-units, which is 1e-12. A method controls the error of each step. The effect of these errors at the end depends on the
-system.
+units, which is 1e-12. A method controls only the error of each step. The effect of these errors at the end depends
+on the system.
 
 | family | integrator | runs | median, end | 99 % | largest | median, between | 99 % | largest | not within |
 | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |
@@ -175,8 +176,8 @@ system.
 ORDERS = """
 ## Orders
 
-Twenty of the smooth systems run with fixed steps. The order is log2 of the ratio of the errors of h and h/2. It is
-computed at the smallest h for which the errors are above rounding (above 1e-13).
+Twenty of the smooth systems run with fixed steps. The order is log2 of the ratio between the errors with the steps
+h and h/2. It is computed at the smallest h for which the errors are above rounding (above 1e-13).
 
 | integrator | order claimed | median observed | from | to |
 | --- | --- | --- | --- | --- |

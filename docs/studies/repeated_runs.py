@@ -145,21 +145,21 @@ def page(rows: list[str], ratios: list[float]) -> str:
     table = "\n".join(["| run | call | median | ratio | aim |", "| --- | --- | --- | --- | --- |", *rows])
     return f"""# Runs with other numbers
 
-How much longer does a run take if a model runs again with other numbers? A call with a new value in `params` takes
-{min(ratios):.2f} to {max(ratios):.2f} times as long as a call with the old value.
+How much longer does a run take if the same model runs again with other numbers? A call with a new value in `params`
+takes {min(ratios):.2f} to {max(ratios):.2f} times as long as a call with the old value.
 
 A loop over a parameter or a start calls `hs.simulate` with one structure and many sets of numbers. The structure is
 compiled and checked once. For new numbers the engine does four things:
 
 - It repeats the checks that depend on the numbers.
 - It evaluates the parameters that are expressions of other parameters.
-- It determines the first modes in compiled code.
+- It determines the modes at the start in compiled code.
 - It computes the tables of linear modes.
 
 `python docs/studies/repeated_runs.py` writes this page. The table gives medians of processor time in one process, in
 which the kinds of calls alternate. A call is a run with `keep="events"`, and includes reading the times and states of
-all events. Each new value differs from the old value in the eighth digit, so that the events do not change. A call
-"by name" is compared with a call to which the model is passed as an object. {machine()}
+all events. Each new value differs from the old value in the eighth digit, so the events do not change. A call "by
+name" passes the name of the model. It is compared with a call that passes the model as an object. {machine()}
 
 {table}
 

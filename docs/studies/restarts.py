@@ -69,43 +69,47 @@ Does a run start correctly on a guard after an event? Of {clear} clear restarts,
 {missed} missed an event.
 
 `python docs/studies/restarts.py` makes random restarts on and near guards. It compares each restart with exact
-arithmetic for the given floating-point numbers, the oracle. In each restart some quantities are zero by definition
-([events](../explanation/events.md)). They are zero in the oracle too.
+arithmetic, for exactly the numbers that the run uses. This solution is called the oracle. In each restart some
+quantities are zero by definition ([events](../explanation/events.md)). They are zero in the oracle too.
 
 A restart is *clear* if the first coefficient of the true series of the guard is more than twice the error bound of
 the engine. Coefficients that are zero by definition are skipped. The verdict on a clear restart must be the true
-verdict. All other restarts are *inside the error bound*. They are counted separately and must follow this rule. A
-coefficient within its bound counts as zero, and the next coefficient decides. If no coefficient decides, the verdict
-is "undecided at rounding", and the mode does not change.
+verdict. All other restarts count as *inside the error bound*. They are counted separately and must follow another
+rule. A coefficient within its bound counts as zero, and the next coefficient decides. If no coefficient decides,
+the verdict is "undecided at rounding", and the mode does not change.
 
 ## Verdicts
 
 The recurrences of the engine give the series and the bounds. The true series are computed with integers of {bits}
-bits. The expressions (one structure for 500 draws) and the state are random. A constant is added to the guard. Its
-value at the state is then zero to the last bit, or differs from zero by 1e-19 to 1. In three of ten restarts the rate
-of the guard is changed in this way too. The oscillator is described under "Whole runs". Its parameters vary over
-decades, and its time over up to 10^6 periods. Its applied force is at the limit of friction or very near to it.
+bits. The expressions and the state are random. There is one structure for 500 draws. A constant is added to the
+guard. The value of the guard at the state is then zero to the last bit, or differs from zero by 1e-19 to 1. In
+three of ten restarts the rate of the guard is changed in this way too. The oscillator is described under "Whole
+runs". Its parameters vary over decades, and its time over up to 10^6 periods. Its applied force is at the limit of
+friction or very near to it.
 
 | restart | judged | clear | spurious | missed | inside, decided | undecided | against the rule | error/bound |
 | --- | --- | --- | --- | --- | --- | --- | --- | --- |
 """
 SEARCHES = """
-A restart is *spurious* if by its verdict the guard fires, but by the oracle it does not. It is *missed* in the
-opposite case. *Inside, decided* means that a higher derivative decides. The last column is the largest error of a
-coefficient of the engine, divided by its bound. The bounds are valid if this quotient is below 1.
+A restart is *spurious* if the verdict of the engine is that the guard fires, but the oracle does not agree. It is
+*missed* in the opposite case. *Inside, decided* means that the first coefficient is within its bound, and a higher
+derivative decides. The last column is the largest error of a coefficient of the engine, divided by its bound. The
+bounds are valid if this quotient is below 1.
 
 ## Searches
 
-A search finds the first zero after the restart. The functions are random polynomials of up to degree 8 with 0 to 5
-zeros. Some zeros are very near to the restart, and some zeros form close pairs. The first 0 to 3 coefficients are
-zero by definition, but contain noise. The oracle counts zeros by Sturm's method in integers.
+A search finds the first zero of a function after the restart. The functions are random polynomials of up to degree
+8 with 0 to 5 zeros. Some zeros are very near to the restart, and some zeros form close pairs. The first 0 to 3
+coefficients are zero by definition, but contain small random errors. The oracle counts zeros by Sturm's method in
+integers.
 
 | zero by definition | searches | stays | leaves | spurious | missed | open | open without reason | start inside |
 | --- | --- | --- | --- | --- | --- | --- | --- | --- |
 """
 RUNS = """
-A search is *open* if it reports that the function is within its error bound of zero at some time. The general method,
-which samples the guard, then searches again. *Start inside* means that the leading coefficient is within its bound.
+A search is *open* if it reports that the function may be zero at some time, because it is within its error bound.
+The general method, which samples the guard, then searches again. *Start inside* means that the leading coefficient
+at the start is within its bound.
 
 ## Whole runs
 
@@ -118,8 +122,8 @@ mu_s = mu_k. In the second kind mu_s is greater than mu_k. In the third kind mu_
 | --- | --- | --- | --- | --- | --- | --- | --- | --- |
 """
 TAIL = """
-An event is *late* if its error exceeds 1e-5 of a period. A slip after a release is *cut short* if it lasts less than
-half of its true time. The cause is a wrong direction of slip.
+An event is *late* if its error exceeds 1e-5 of a period. A slip after a release is *cut short* if it lasts less
+than half of its true duration. The cause of a short slip is a wrong direction of slip.
 
 Run `python docs/studies/restarts.py [restarts]` to repeat the study. It takes {minutes:.0f} minutes on one core.
 """

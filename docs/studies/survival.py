@@ -222,8 +222,8 @@ and computes at most {most} point per kill again. `docs/studies/survival.py` int
 ## Stopped at a random step and resumed
 
 Each run was stopped at {moments} random steps by `limits={{"steps": ...}}` and continued by `resume()`. The table
-counts the runs that stopped. Compiled code checks limits only from time to time, and a run that reached its end
-before such a check is *done*. Resumed runs are compared bit for bit with a run that was never stopped. The comparison
+counts the runs that stopped. Compiled code checks limits only at certain times. If a run reached its end before the
+next check, it is *done*. Resumed runs are compared bit for bit with a run that was never stopped. The comparison
 includes the times and states of all steps, the events with the states before and after, the status and the message.
 
 | integrator | {scenes} |
@@ -235,9 +235,9 @@ includes the times and states of all steps, the events with the states before an
 ## Killed
 
 A sweep of {points} points runs in a separate process, and took {seconds:.1f} s without interruption. SIGKILL ended
-the process {kills} times at random times, and each time the sweep was started again. The sweep had finished before
-the kill {begun} times. It then began again without a journal. Before a point is computed, it is written to a log
-file.
+the process {kills} times at random times, and each time the sweep was started again. In {begun} cases the sweep had
+finished before the kill. It was then started again without a journal. Before a point is computed, it is written to
+a log file.
 
 | | |
 | --- | --- |

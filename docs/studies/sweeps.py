@@ -115,7 +115,7 @@ def page(
             "| --- | --- | --- |",
             *rates,
             "",
-            "The comparison includes every quantity and every status.",
+            "The comparison of the results includes every quantity and every status.",
             "",
             "## Memory",
             "",
@@ -128,8 +128,8 @@ def page(
             "",
             "## Points that cannot succeed",
             "",
-            "Three points have parameter values without a steady state. For each of these points the sweep has a "
-            "status, and NaN as the result.",
+            "At three further points the parameters have values without a steady state. For each of these "
+            "points the sweep reports a status, and NaN as the result.",
             "",
             "| fault | status |",
             "| --- | --- |",

@@ -77,7 +77,9 @@ def page() -> str:
     out += f"The first table has the first {FIRST} faults of seed {SEEDS[0]}.\n\n{table(first)}\n"
     seeds = ", ".join(map(str, SEEDS))
     out += f"The second table has {MANY} faults of each of the seeds {seeds}.\n\n{table(many)}\n"
-    out += "The third table has faults that were not found on the right line, the most frequent first.\n\n"
+    out += (
+        "The third table lists the faults that were not found on the right line, the most frequent first.\n\n"
+    )
     out += "| fault | end | times |\n| --- | --- | --- |\n"
     for (what, end), times in sorted(lost.items(), key=lambda item: (-item[1], item[0]))[:20]:
         out += f"| {what} | {end} | {times} |\n"
@@ -98,19 +100,19 @@ The faults are drawn at random. There are three kinds:
 - *A factor left out* means that `a*b` becomes `a` or `b`, and `a/b` becomes `a`.
 - *A name exchanged* means that a name in an expression becomes another name of the model.
 
-A fault counts only if it alters a unit. A factor that is left out must not be a pure number, and exchanged names must
-have different units. The script has its own table of the units of all names, which shares no code with the check.
-These changes do not count:
+A fault counts only if it changes the unit of an expression. A factor that is left out must not be a pure number,
+and exchanged names must have different units. The script has its own table of the units of all names, which shares
+no code with the check. These changes do not count:
 
-- The change is in a guard, monitor or surface that is a single product, which may have any unit.
-- Only a number remains, which has the unit that its place needs.
+- The changed expression is a guard, monitor or surface that is a single product. Such an expression may have any unit.
+- Only a number remains, and a number has any unit that its place needs.
 - Other checks refuse the changed model.
 
-The right line is the line of the changed expression. For a changed declaration, the line of the declaration is right,
-and so is the line of each expression with this name. For a change in the law of a contact, the line of its load or of
-its arguments is right.
+A fault is found on the right line if the warning is on the line of the changed expression. For a changed
+declaration, the line of the declaration is right, and so is the line of each expression with this name. For a
+change in the law of a contact, the line of its load or of its arguments is right.
 """
-REASONS = """These are the reasons:
+REASONS = """The faults were not found for these reasons:
 
 - The unit of an impact force is not declared. If `m` is left out of `-g + p/m`, the force p becomes an acceleration.
   All units still agree, unless a contact force determines the unit of `p`. The unit of t in `thermostat` is not

@@ -165,17 +165,18 @@ def claim(found: Maps, quantity: str, study: StepStudy) -> Claim:
     end = best["above 10 %"] or {"F0/N": math.nan, "r": math.nan}
     truly = readings[pair_name((closest.split("; ")[0], EXACT))]
     why = (
-        f"The map has a ridge. The closest reading ({described(closest)}) has {_percent(best['maximum'])} at "
-        f"F0/N = {best['at'][0]:g}, r = {best['at'][1]:g}. It stays above 10 % up to F0/N = {end['F0/N']:g}, "
-        f"r = {end['r']:g}. {study.sentence(quantity)} Near the threshold (F0/N = {found.ratios[0]:g}, median over r) "
-        f"it is {_percent(best['near the threshold'])} in this reading, and {_percent(truly['near the threshold'])} "
-        f"compared with the exact motion. In the paper it decreases there."
+        f"Our map has such a ridge. The closest reading ({described(closest)}) has "
+        f"{_percent(best['maximum'])} at F0/N = {best['at'][0]:g}, r = {best['at'][1]:g}. It stays above 10 "
+        f"% up to F0/N = {end['F0/N']:g}, r = {end['r']:g}. {study.sentence(quantity)} Near the threshold "
+        f"(F0/N = {found.ratios[0]:g}, median over r) it is {_percent(best['near the threshold'])} in this "
+        f"reading, and {_percent(truly['near the threshold'])} compared with the exact motion. In the paper "
+        "the deviation decreases near the threshold."
     )
     text = (
         f"{quantity}_D is at least 10 % for F0/N from {_range_text(box10['F0/N'])} and r from "
-        f"{_range_text(box10['r'])}. It is at least 5 % for F0/N from {_range_text(box5['F0/N'])} and r from "
-        f"{_range_text(box5['r'])}. The maximum is {100 * published['maximum']:.2f} % at F0/N = {where[0]}, "
-        f"r = {where[1]}"
+        f"{_range_text(box10['r'])}. {quantity}_D is at least 5 % for F0/N from "
+        f"{_range_text(box5['F0/N'])} and r from {_range_text(box5['r'])}. The maximum is "
+        f"{100 * published['maximum']:.2f} % at F0/N = {where[0]}, r = {where[1]}"
     )
     exact_rows = {name: row for name, row in readings.items() if name.endswith(EXACT)}
     return Claim(

@@ -31,14 +31,14 @@ _CAPTIONS = {
     "figure 5": "The curves are the results of these cases over eps_v. The grey line is the published setting.",
     "figure 6": "The left panel shows the run time. The right panel shows the number of evaluations, on which "
     "other programs have no effect.",
-    "figure 7": "The grey mark is at +225 %.",
+    "figure 7": "The grey mark shows the claim of +225 %.",
     "figure 10": "The first two columns are for the published A2, with the velocity in stick kept and set to "
     "zero. The last column is for the exact A2.",
     "figure 11": "These are the maps of Figure 10 for the energy.",
     "figure 12": "Without stick the force jumps between its limits. With v kept the body creeps in stick.",
     "figure 13": "The body does not stick in this case, so that all columns are equal.",
-    "text": "The deviation is of first order in the step. It tends to zero with the step, because the motion "
-    "tends to the motion with stick.",
+    "text": "The deviation is of first order in the step. It tends to zero with the step, because the computed "
+    "motion tends to the motion with stick.",
 }
 _WIDTH = 120
 _PAIR = (
@@ -76,24 +76,24 @@ def _head(study: Study, claims: tuple[Claim, ...]) -> str:
     return f"""\
 # He et al. 2026, claim by claim
 
-When must a model include stick-slip? The published map does not answer this question, because it shows the size of
-the step ({SOURCE}). For small steps, the motion of the equation without stick approaches the motion with stick. The
-values of the map therefore decrease with the step. The motion, the spectrum and the reduction to (r, F0/N) in the
-paper are right. The run times in the paper are those of one implementation.
+When must a model include stick-slip? The map in the paper does not answer this question, because it shows the size
+of the step ({SOURCE}). For small steps, the motion of the equation without stick approaches the motion with stick.
+The values of the map therefore decrease with the step. The motion, the spectrum and the reduction to (r, F0/N) in
+the paper are right. The run times in the paper are those of one implementation.
 
 This study computes every figure again with our implementation of the published method (`rk4-dichotomy`, and
 `rk4-sign` for "stick-slip not considered"). The paper leaves details of the method open. The study runs the method
 with each choice of these details, called a reading, and compares the results with the exact motion (`exact`). The
-sections after the claims have results that depend on no step. They show which motions stop, for how long, and how
-large the errors of models without stops are.
+sections after the claims give results that do not depend on a step. They show which motions stop, for how long, and
+how large the errors of models without stops are.
 
 | figure | claim | verdict |
 | --- | --- | --- |
 {rows}
 
-**Terms.** r is omega/omega_n. A is half the range of x in a period, and E is the integral of x**2 over a period. A0
-and E0 are for the motion without friction. A1 and E1 are for "stick-slip not considered" (`rk4-sign`), and A2 and E2
-for stick-slip considered. A_D is
+**Terms.** r is the frequency ratio omega/omega_n. A is half the range of x in a period, and E is the integral of
+x**2 over a period. A0 and E0 are the values for the motion without friction. A1 and E1 are the values for
+"stick-slip not considered" (`rk4-sign`), and A2 and E2 the values for stick-slip considered. A_D is
 |A1 - A2|/A2, and E_D is defined in the same way. The paper leaves these details of the dichotomy open:
 
 - *v kept* or *v zero*: in stick the velocity of the body is kept, or set to zero.
@@ -137,8 +137,9 @@ def _readings(study: Study) -> str:
         [
             "## Details that the paper leaves open",
             "",
-            "The table gives the error of the amplitude in per cent. It is the mean over the last periods of a run",
-            "(least to greatest). Only one of the open details has a large effect. This detail is the velocity in",
+            "The table gives the error of the amplitude in per cent. This error is the mean over the last periods of a",
+            "run. The brackets give the least and the greatest value. Only one of the open details has a "
+            "large effect. This detail is the velocity in",
             "stick, which Eq. 4 keeps at its value after the dichotomy. If the motion does not repeat, the amplitude",
             "is a range.",
             "",
@@ -158,10 +159,13 @@ def _truth(study: Study, image: Callable[[str], str]) -> str:
         [
             "## Results that hold for any step",
             "",
-            f"The exact steady motion was computed on {points[0]} x {points[1]} points. The residual of periodicity is "
+            f"The exact steady motion was computed on {points[0]} x {points[1]} points. The difference "
+            "between the states at the beginning and at the end of a period is "
             f"{facts['median residual of periodicity']:.0e} (median), and at most "
-            f"{facts['largest residual of periodicity']:.0e}. Den Hartog's boundary is a closed form that separates",
-            f"points with stops from points without stops. {disagree} points are on the wrong side. If there are no",
+            f"{facts['largest residual of periodicity']:.0e}. Den Hartog's boundary is a closed form that "
+            "separates",
+            f"points with stops from points without stops. {disagree} points are on the wrong side of this "
+            "boundary. At points without",
             "stops, the closed form of the amplitude agrees with the run to",
             f"{facts['largest deviation of the closed form where it holds']:.0e}. At low frequencies there are up to",
             f"{facts['most stops per period']} stops per period.",
@@ -178,7 +182,7 @@ def _truth(study: Study, image: Callable[[str], str]) -> str:
             "",
             f"![deviation of simpler models]({image('simpler-models')})",
             "",
-            "*At grey points the body does not move, or the model has no answer.*",
+            "*At grey points the body does not move, or the simpler model has no answer.*",
         ]
     )
 
@@ -221,12 +225,12 @@ def _timed_map(study: Study, picture: str) -> str:
         [
             "## Run time of a whole map",
             "",
-            f"The map has the steady amplitude and energy on {study.timed_map.side} x "
-            f"{study.timed_map.side} points, from "
-            f"{facts['settling']}. All methods use the same",
+            f"The map has the steady amplitude and energy at {study.timed_map.side} x {study.timed_map.side} "
+            f"points. Each value is from a run of {facts['settling']}. All methods use the same",
             "threads in the same run, and the time includes all costs of a point. `exact` runs the whole map as one",
             "`hs.sweep(..., after=100)`. The other methods run a random sample of the points, one by one, which adds a",
-            "millisecond per point. Errors are for this sample. The reference is the motion that has settled to",
+            "millisecond per point. The errors in the table are those of this sample. The reference is the "
+            "exact motion after all changes have decayed to",
             'rounding. The method "shooting" is `hs.steady_state`, which finds the orbit without a long run and also',
             "determines its kind.",
             "",
@@ -244,8 +248,9 @@ def _how(study: Study) -> str:
         [
             "## Size of the study",
             "",
-            f"The size is {study.size.name}. Runs have {study.size.periods} periods from rest, and A and E are",
-            f"those of the last {study.size.last} periods. Without stick the motion does not repeat, so that one",
+            f"The study was run in its {study.size.name} size. Runs have {study.size.periods} periods from "
+            "rest, and A and E are",
+            f"those of the last {study.size.last} periods. Without stick the motion does not repeat, so one",
             f"period is not sufficient. {_PAIR} The study ran on {study.workers} threads.",
             "",
             "| part | seconds |",

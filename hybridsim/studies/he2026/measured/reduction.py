@@ -138,11 +138,12 @@ def claim(found: Reduction) -> Claim:
     verdict = Verdict.REPRODUCED if both and to_rounding else Verdict.SHAPE if to_rounding else Verdict.NOT
     literal, stribeck = ours[paper.LITERAL.name], float(found.spread(STRIBECK).max())
     why = (
-        f"With `exact` A, E and the stick fraction depend only on (r, F0/N), to {max(found.rounding.values()):.0e} "
-        f"over {_SAMPLES} points and three loads. Without stick A and E also depend only on (r, F0/N), except for "
-        f"chatter. The reduction fails if a velocity is given in m/s. With eps_v = 8e-4 and v kept, A/A0 varies by "
-        f"{100 * literal['spread of A/A0']:.2g} % over F0 = {FORCES[0]:g} to {FORCES[-1]:g} N. With a Stribeck "
-        f"velocity A/A0 varies by {100 * stribeck:.2g} %."
+        "With `exact` A, E and the stick fraction depend only on (r, F0/N), to "
+        f"{max(found.rounding.values()):.0e} over {_SAMPLES} points and three loads. Without stick A and E "
+        "also depend only on (r, F0/N), apart from the chatter. The reduction fails if the method or the "
+        "law contains a velocity in m/s. With eps_v = 8e-4 and v kept, A/A0 varies by "
+        f"{100 * literal['spread of A/A0']:.2g} % over F0 = {FORCES[0]:g} to {FORCES[-1]:g} N. With a "
+        f"Stribeck velocity A/A0 varies by {100 * stribeck:.2g} %."
     )
     return Claim(
         "figures 8, 9",

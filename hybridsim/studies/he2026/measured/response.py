@@ -108,9 +108,10 @@ def claim_figure_3(runs: dict[str, Response]) -> Claim:
     verdict = Verdict.REPRODUCED if exact["holds"] and keeps else Verdict.NOT
     third, fifth = exact["third"], exact["fifth"]
     why = (
-        f"The exact motion has the period of the forcing. The even harmonics of x are below {exact['even']:.0e}. "
-        f"The third and fifth harmonics are {100 * third:.1f} % and {100 * fifth:.1f} % of the first. {len(keeps)}"
-        f" of the {len(ours)} readings of the method have these harmonics to 0.1 %."
+        "The exact motion has the period of the forcing. The even harmonics of x are below "
+        f"{exact['even']:.0e}. The third harmonic is {100 * third:.1f} % and the fifth harmonic "
+        f"{100 * fifth:.1f} % of the first. {len(keeps)} of the {len(ours)} readings of the method have "
+        "these harmonics with a difference of at most 0.1 %."
     )
     return Claim(
         "figure 3",
@@ -179,14 +180,14 @@ def claim_figure_13(runs: dict[str, Response], figure_12: dict[str, Response]) -
     less = ours[closest]["A_D"] < before[closest]["A_D"]
     verdict = Verdict.REPRODUCED if near and less else Verdict.SHAPE if less else Verdict.NOT
     why = (
-        f"The deviation is smaller than in Figure 12, as claimed, but no reading gives more than "
-        f"{100 * greatest:.2g} %. In this case the exact motion sticks for {100 * runs[EXACT].stick:.2g} % of the "
-        f"period, so that a method without stick has no error."
+        "The deviation is smaller than in Figure 12, as claimed, but no reading gives more than "
+        f"{100 * greatest:.2g} %. In this case the exact motion does not stick "
+        f"({100 * runs[EXACT].stick:.2g} % of the period), so a method without stick has no error."
     )
     return Claim(
         "figure 13",
         "13",
-        "A_D is 2 % at F0/N = 0.80, r = 1.0. Less stick causes less deviation",
+        "A_D is 2 % at F0/N = 0.80, r = 1.0. Less stick causes a smaller deviation",
         {"A_D": 0.02},
         ours,
         closest,

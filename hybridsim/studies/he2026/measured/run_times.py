@@ -127,7 +127,8 @@ def claim_figure_6(times: RunTimes) -> Claim:
     return Claim(
         "figure 6",
         "6",
-        "the run time grows fast if eps_v decreases, by more than 120 % at 1e-7. It hardly depends on r, N and F0",
+        "the run time grows fast if eps_v decreases, by more than 120 % at 1e-7. "
+        "This growth hardly depends on r, N and F0",
         {"t_d at 1e-7": 1.20},
         ours,
         closest,
@@ -166,8 +167,8 @@ def claim_figure_7(times: RunTimes) -> Claim:
     why = (
         f"Stick changes the run time by {100 * low:+.0f} % to {100 * best['t_D, mean']:+.0f} % (means of "
         f"{len(CASES)} cases). The number of evaluations of the right-hand side is "
-        f"{best['right-hand sides, with over without']:.3f} times as large. The claimed increase is "
-        f"therefore the cost of one implementation. `exact` includes stick and takes "
+        f"{best['right-hand sides, with over without']:.3f} times as large with stick. The claimed increase "
+        "is therefore the cost of one implementation. `exact` includes stick and takes "
         f"{100 * (1 + fmean(against)):.1f} % of the time of the method without stick."
     )
     return Claim(

@@ -37,11 +37,12 @@ def claim(maps: Maps, study: StepStudy, truth: Truth) -> Claim:
     stage = study.along(SIGNS[-1].name, "A")
     one, five = truth.harmless(0.01), truth.harmless(0.05)
     why = (
-        f"A_D grows with the stick fraction (rank correlation {ours[closest][key]:.2f}), but the step has an equal "
-        f"influence. If the step decreases at unchanged stick fractions, A_D decreases from "
-        f"{100 * stage[first]:.2g} % to {100 * stage[-1]:.2g} %. The error of the closed form without stops depends "
-        f"only on the stick fraction. It is below 1 % for stick fractions below {100 * one:.2g} %, and below "
-        f"5 % for those below {100 * five:.2g} %."
+        f"A_D grows with the stick fraction (rank correlation {ours[closest][key]:.2f}), but the step has an "
+        "equal influence. If only the step decreases, the stick fractions do not change, but A_D decreases "
+        f"from {100 * stage[first]:.2g} % to {100 * stage[-1]:.2g} %. Den Hartog's closed form for motions "
+        "without stops does not depend on a step. Its error depends only on the stick fraction. This error "
+        f"is below 1 % for stick fractions below {100 * one:.2g} %, and below 5 % for those below "
+        f"{100 * five:.2g} %."
     )
     return Claim(
         "text",
