@@ -231,6 +231,11 @@ def point_at_end(solution: Solution) -> Point:
     return _point(solution, solution._segments[_last_with_length(solution)], side=-1)
 
 
+def point_after_end(solution: Solution) -> Point:
+    """Return the point at the end of a run, after any event there."""
+    return _point(solution, solution._segments[-1], side=-1)
+
+
 def point_at(solution: Solution, t: float) -> Point:
     """Return the point of a run just before time t."""
     index, _ = solution._of_model.segment_at(np.array([t]), "-")

@@ -18,6 +18,8 @@ from hybridsim.solution import Solution
 
 _ENDS = np.array([-1.0, 1.0])
 _BISECTIONS = 200  # more than enough for doubles
+_ROUNDING = 1e-12  # of the values of a piece and of the level: a quantity beyond the level by less touches it
+_LEAST = 4.0 * np.finfo(float).eps  # the same, of the largest value of the run
 
 
 class OverRun(Measures):
@@ -70,7 +72,7 @@ class OverRun(Measures):
         """Return the first time at which a quantity is beyond a level, or infinity if it never is.
 
         It is above the level if `is_upward`, otherwise below it. Between two extrema a quantity passes a level at most
-        once, so that no passage is missed.
+        once, so that no passage is missed. A quantity that only touches the level, within rounding, does not pass it.
         """
         found = first_passage(self._alone(name), level, 1.0 if is_upward else -1.0)
         return self.solution.t_start + found
@@ -82,7 +84,9 @@ def first_passage(orbit: Orbit, level: float, sign: float) -> float:
     The orbit has one quantity. Where no polynomial represents it, the time is that of a Gauss point.
     """
     intervals, local, values = _knots(orbit)
-    beyond = np.flatnonzero(sign * (values - level) > 0.0)
+    sizes = np.fmax.reduce(np.abs(orbit.values[:, :, 0]), axis=1)
+    rounding = _ROUNDING * np.fmax(sizes, abs(level)) + _LEAST * np.fmax.reduce(sizes)
+    beyond = np.flatnonzero(sign * (values - level) > rounding[intervals])
     if not len(beyond):
         return math.inf
     j, k = int(beyond[0]), int(intervals[beyond[0]])

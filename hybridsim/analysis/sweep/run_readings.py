@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+from hybridsim.analysis.steady.motion import point_after_end
 from hybridsim.analysis.steady.over_run import OverRun
 from hybridsim.analysis.structures.swept import is_structure, modes_of, quantities_of
 from hybridsim.calls import Default
@@ -51,7 +52,7 @@ class OfRun:
         if only_ends:
             arguments = {"keep": Default("nothing"), **arguments}
         if previous is not None:
-            arguments["x0"] = _end_of(previous)
+            arguments |= _end_of(previous, model)
         solution = simulate(model, **arguments)
         if not solution.success:
             raise SimulationError(f"{solution.status}: {solution.message}")
@@ -154,5 +155,10 @@ def _reading(run: OverRun, word: str) -> float:
     return float(run.stops(name) if head == "stops" else getattr(run, head)[name])
 
 
-def _end_of(run: OverRun) -> dict[str, float]:
-    return dict(zip(run.solution.names, run.solution.x_end.tolist(), strict=True))
+def _end_of(run: OverRun, model: Model) -> dict[str, Any]:
+    """Return the states, discrete states and modes at the end of a run, as arguments of `simulate`."""
+    solution = run.solution
+    if is_structure(model):
+        return {"x0": dict(zip(solution.names, solution.x_end.tolist(), strict=True))}
+    end, names = point_after_end(solution), (*solution.names, *(each.name for each in model.discrete))
+    return {"x0": dict(zip(names, end.values.tolist(), strict=True)), "z0": end.z}

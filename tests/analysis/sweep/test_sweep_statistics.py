@@ -113,6 +113,55 @@ def test_a_passage_shorter_than_any_step_is_found() -> None:
     assert (above, at_once) == (math.inf, 1.0)
 
 
+def test_a_touch_of_a_level_is_no_passage() -> None:
+    """A bouncing ball does not pass its floor, and a motion from rest at x = 1 stays below 1, with v < 0 at first."""
+    ball = hs.Model(
+        "ball",
+        parameters={"g": 9.81},
+        states=[hs.State("h", 1.0, "w"), hs.State("w", 0.0, "-g + N")],
+        impacts=[hs.Impact("N", "h", restitution=0.5)],
+    )
+    found = one(ball, ["first_passage.h<0", "first_passage.w>2"], t_span=(5, 8))
+    assert found["first_passage.h<0"] == math.inf
+    assert found["first_passage.w>2"] == pytest.approx(5.0 + math.sqrt(2.0 / 9.81), rel=1e-9)
+    half = math.pi / math.sqrt(1.0 - RATIO**2)
+    for integrator in ("exact", "taylor", "tsit5"):
+        passages = ["first_passage.x>1", "first_passage.v>0"]
+        above, upward = one(decaying(), passages, t_span=(0, 10), integrator=integrator).values()
+        assert above == math.inf
+        assert upward == pytest.approx(half, rel=1e-7)
+
+
+def test_a_warm_start_continues_discrete_states_and_modes() -> None:
+    """x rises from 1/4 to 1 again and again, in two modes by turns, and n counts; three runs of 5/4 are one of 15/4."""
+    count = {"x": 0.25, "n": "n + 1"}
+    up = hs.Mode("up", hs.Guard("top", "1 - x", hs.Choice("down", reset=count)))
+    down = hs.Mode("down", hs.Guard("top", "1 - x", hs.Choice("up", reset=count)))
+    model = hs.Model(
+        "counter",
+        parameters={"rate": 1.0},
+        states=[hs.State("x", 0.25, "rate")],
+        discrete=[hs.Discrete("n", 0.0)],
+        components=[hs.Component("side", [up, down], initial="up")],
+        outputs=[hs.Output("count", "n")],
+    )
+    found = hs.sweep(
+        model,
+        {"rate": [1.0] * 3},
+        ["final.x", "mean.count", "mode_fraction.side.up"],
+        t_span=(0, 1.25),
+        warm_start=True,
+    )
+    assert found["final.x"] == pytest.approx(
+        [0.75, 0.5, 0.25], rel=1e-12
+    )  # the last one after the reset at 15/4
+    # resets at 3/4, 3/2, 9/4, 3 and 15/4
+    assert found["mean.count"] == pytest.approx(
+        [0.5 / 1.25, (0.25 + 1.5 + 0.75) / 1.25, (1.5 + 3.0) / 1.25], rel=1e-9
+    )
+    assert found["mode_fraction.side.up"] == pytest.approx([0.6, 0.6, 0.6], rel=1e-9)
+
+
 def test_final_states_and_statistics_belong_to_one_run() -> None:
     """A chain of warm starts goes on from the last states."""
     found = hs.sweep(thrown(), {"mu": [0.3, 0.3]}, ["final.x", "maximum.v"], t_span=(0, 0.2), warm_start=True)
