@@ -20,8 +20,9 @@ _INTRODUCTION = """\
 
 {answer}
 
-The answer of each scene is known. It is a closed form, or has at least 30 digits. These digits are from a computation
-that shares no code with the package. The command `hybridsim atlas` runs all scenes with all methods.
+The answer of each scene is known. It is a closed form, or a number with at least 30 digits. These digits are
+computed by a program that shares no code with the package. The command `hybridsim atlas` runs all scenes with all
+methods.
 
 ![scenes against integrators, a verdict for each pair](matrix.png)
 
@@ -29,7 +30,7 @@ A method is *right* in a scene if it satisfies four conditions:
 
 - It finds every event, in the right mode and order.
 - It reports no other events.
-- States that are constant in stick are exact at every setting.
+- States that are constant in stick are exact at every setting of the method.
 - At the tightest setting the errors are within the scene's tolerance.
 
 | method | settings |
@@ -43,20 +44,21 @@ and unit/120000, if the run needs at most 2e6 steps |
 | `scipy-rk45 cooldown` | rtol 1e-9, guards ignored for 1e-2, 1e-3 and 1e-4 units after each event |
 
 The *unit* of a scene is its typical time, which is the period of the forcing or about one oscillation. The scene's
-tolerance applies to methods with error control. For `rk4-dichotomy`, which bisects its steps, the tolerance is at least
-1e-5. Other fixed-step methods place events at the ends of steps. Their tolerance is at least 4.2e-4, the length of two
+tolerance applies to methods with error control. `rk4-dichotomy` bisects its steps. Its tolerance is at least 1e-5.
+Other fixed-step methods place events at the ends of steps. Their tolerance is at least 4.2e-4, the length of two
 steps of unit/4800. In scenes longer than fifty units, `scipy-rk23` runs with rtol 100 times as large.
 
-In the tables of the scenes, a number follows the name of a method. This number is the larger of two errors at the last
-setting. One is the error of event times in units. The other is the error of states relative to their largest true
-value. If the error decreases with the step, the table also has the observed order of convergence. Integrators also run
-scenes beyond their stated limits. They then fail for the stated reason.
+In the tables of the scenes, a number follows the name of a method. This number is the larger of two errors of the
+last setting. One is the error of event times, in units of the scene. The other is the error of states, relative to
+their largest true value. If the error decreases with the step, the table also has the observed order of
+convergence. Integrators also run the scenes that they do not support according to their stated limits. In these
+scenes they fail for the stated reason.
 
 Most methods use the event location and the mode selection of the engine. The exceptions are the fixed-step methods, and
 methods with native events, a cooldown or regularized friction. If all methods are right in a scene, its text describes
 the failure of other programs.
 
-The native event location of `solve_ivp` fails by these mechanisms:
+The search for events of `solve_ivp` itself fails by these mechanisms:
 
 | mechanism | effect |
 | --- | --- |
@@ -77,7 +79,8 @@ fails before it searches for the event. |
 The picture of a scene shows one state in a time window around the first visible error of a method. The solid line is a
 correct run. The dashed line is a run of the failing method. The legend names this method, and the table names its
 setting. The strip below the curves shows the events of both runs in this window. The number of events of each run is at
-the right edge of the strip. Circles are known values. If the error is below 4 % of the motion, a second panel shows it.
+the right edge of the strip. Circles are known exact values. If the error is below 4 % of the motion, a second panel
+shows the error.
 """
 _QUESTIONS = {
     "events": "Does a method find each event once, at the right time and in the right order?",
@@ -89,8 +92,8 @@ _QUESTIONS = {
     "sensitivity": "How accurate is a method if the motion amplifies its errors?",
 }
 _FAILURES = (*WRONG, HANG, ERROR)
-_FAILURE = """A failure is a wrong answer, a wrong mode sequence, a hang or an error. A refusal is not a failure. A
-scene that is not run is not a failure. The first page of the atlas has the [whole matrix](index.md)."""
+_FAILURE = """A failure is a wrong answer, a wrong mode sequence, a hang or an error. A refusal is not a
+failure, nor is a scene that is not run. The [first page of the atlas](index.md) has a table of all methods."""
 _LEAST_ORDER = 0.5  # smallest order that counts as convergence
 _NUMBER = re.compile(r"(?<![\w.])\d+\.\d{9,}(?:e[+-]?\d+)?")
 _DIGITS = 9  # digits of numbers in reasons
@@ -146,7 +149,7 @@ def page(result: Atlas, trouble: str, scenes: list[Scene], pictures: Collection[
     opening = f"{_QUESTIONS.get(trouble, '')} {sentence} {_FAILURE}"
     lines = [f"# {TROUBLES.get(trouble, 'Scenes')}", "", _filled(opening), "", *table, ""]
     for scene in scenes:
-        lines += [f"## {scene.title or scene.name}", "", f"`{scene.name}`: {scene.cause}.", ""]
+        lines += [f"## {scene.title or scene.name}", "", f"`{scene.name}`. *Difficulty:* {scene.cause}.", ""]
         lines += [_filled(scene.story), ""]
         if scene.name in pictures:
             lines += [f"![{scene.title}]({trouble or 'scenes'}/{scene.name}.png)", ""]
