@@ -70,8 +70,8 @@ def advise(
         of f). Or a function of the `SteadyState` (with ``t_span`` of the `Solution`) that returns a number.
     tol : float, optional
         Largest relative error. If the full model's value is zero, a rung is adequate if its value is zero
-        too. A value counts as zero if it is very small. The limit is 1e-6 times the tolerance times the
-        largest value of the same quantity.
+        too. A value counts as zero below 1e-6 times the tolerance times the largest value of the same
+        quantity.
     over, mode : mapping of str to sequence, str, optional
         Values of parameters as in `sweep`: a map of the simplest adequate rung.
     uncertain : mapping of str to tuple of float, optional
