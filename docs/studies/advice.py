@@ -189,13 +189,12 @@ def page(
         f"{len(dear)} points `advise` had stopped an adequate model, because the model takes far more time "
         "than the full model.",
         "",
-        f"`python docs/studies/advice.py` draws {count} points in a map of the reference model, with F0/N in "
+        f"`python docs/studies/advice.py` draws {count} points in a map of the reference model. F0/N is in "
         "[0.5, 1.5] and r in [0.05, 2]. For each point `advise` names the simplest model whose steady "
         f"amplitude of x is within {100 * TOL:g} %. The script then finds this model again by a search "
         "through all models, called brute force:",
         "",
-        "- The full motion is computed in closed form, from rest until the free vibration is too small to "
-        "change the result.",
+        "- The full motion is computed in closed form, from rest until the free vibration has decayed.",
         "- Formulas give the amplitude of the models without friction and with equivalent viscous damping.",
         "- The regularized models are run over the same time.",
         "",
@@ -225,9 +224,9 @@ def page(
         "",
         "*The map shows the answers of `advise` on a grid with N = 40 N. Below F0 = 20 N nothing moves. For "
         "motions with stops, the simplest adequate model is usually Karnopp's, with a v0 of 1 % of the "
-        "largest speed. At some frequencies it is tanh or arctan with this v0. These models take at least "
-        "as much time as the full model. For motions without stops, Den Hartog's formula is exact. Near "
-        "resonance equivalent viscous damping is adequate.*",
+        "largest speed. At some frequencies it is the form tanh or arctan with this v0. These models take "
+        "at least as much time as the full model. For motions without stops, Den Hartog's formula is exact. "
+        "Near resonance equivalent viscous damping is adequate.*",
         "",
     ]
     return "\n".join(lines)

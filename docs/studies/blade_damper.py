@@ -183,8 +183,8 @@ amplitude is {ends[0] / peaks[best]:.1f} times as large. With a damper that alwa
         ends[1]
         / peaks[
             best
-        ]:.1f} times as large. A lighter damper dissipates almost nothing. A heavier damper sticks, and only makes
-the blade stiffer.
+        ]:.1f} times as large. With a load below the best one, the damper dissipates almost nothing. With a
+        load above it, the damper sticks, and only makes the blade stiffer.
 
 The model `models/blade-damper.toml` is one mode of the blade with a Jenkins element (Griffin 1980,
 [doi:10.1115/1.3230256](https://doi.org/10.1115/1.3230256)). `python docs/studies/blade_damper.py` runs one `hs.sweep`
@@ -199,12 +199,12 @@ over N. For each load the script finds the largest amplitude over the frequency.
 ## Checks
 
 - **No normal load.** The peak of the blade alone is F0/(c omega_d) = {1e3 * ends[0]:.6f} mm, with omega_d =
-  sqrt(k_b/m - (c/2m)^2). At N = {loads[0]:g} N the sweep differs from this peak by {
+  sqrt(k_b/m - (c/2m)^2). At N = {loads[0]:g} N the sweep differs from this peak by a relative {
         off[0]:.2e}. The reason is the
   light damper, which decreases the peak by 4 mu N/(pi F0) = {light:.2e}.
 - **Damper that always sticks.** With the stiffness k_b + k_d the peak of the amplitude is {
         1e3 * ends[1]:.6f} mm.
-  At N = {loads[-1]:g} N the sweep differs from this peak by {off[1]:.1e}.
+  At N = {loads[-1]:g} N the sweep differs from this peak by a relative {off[1]:.1e}.
 - **Work.** For any motion with two reversals per period, the loop of the force f over x is a parallelogram of area
   4 mu N (A - mu N/k_d). At all loads at which the damper slips, the integrated work differs from this area by at
   most {work:.1e}.

@@ -167,17 +167,17 @@ speed. The script `python docs/studies/brake.py` finds the onset in three ways:
   if c is small enough. At the onset lambda = i sqrt(2).
 - **Linearization.** `hs.linearize` in the mode `slip-` gives the coefficient at which its `growth` is zero.
 - **Simulation.** The run starts {SHAKE:g} away from steady sliding, and lasts {WATCHED:g} units of time without an
-  event. A matrix maps the states at a time t to the states at t + {STEP:g}. It is fitted to the run (dynamic mode
+  event. A matrix maps the states to the states {STEP:g} later. It is fitted to the run (dynamic mode
   decomposition, Schmid 2010, [doi:10.1017/S0022112010001217](https://doi.org/10.1017/S0022112010001217)). The largest
-  eigenvalue of the matrix gives the growth. This method uses no derivatives of the model.
+  eigenvalue of the matrix gives the growth.
 
 | c | onset, closed form | `linearize` (error) | simulation (error) | error of the growth, `linearize` | simulation |
 | --- | --- | --- | --- | --- | --- |
 {table}
 
-The last two columns are the largest differences from the closed form over mu = {FRICTION[0]:g} to {FRICTION[-1]:g}.
-The differences are largest at mu = 3/4. There two eigenvalues are equal. Two equal eigenvalues change with the
-square root of a change of the matrix.
+The last two columns are the largest differences from the closed form, between mu = {FRICTION[0]:g} and
+{FRICTION[-1]:g}. The differences are largest at mu = 3/4, where two eigenvalues are equal. Equal eigenvalues
+change with the square root of a change of the matrix.
 
 ![Growth of a small disturbance, and the final amplitude, over the coefficient of friction](../images/brake.png)
 

@@ -131,7 +131,7 @@ callbacks of heyoka are Python functions. The kernels of hybridsim are compiled 
     return f"""# A chain of blocks: what an event costs
 
 How does the cost of an event grow with the number of blocks n? In hybridsim the time per event grows as
-n^{exponent:.2f}. This time includes a share of the time of all steps.
+n^{exponent:.2f}. This time includes a share of the time of the steps.
 
 `hs.chain_on_belt(n)` is a chain of blocks of mass 1 on a belt of speed {BELT}. The leaf springs have a stiffness of
 {LEAF}, and the coupling springs of {COUPLING}. The friction is 1/(1 + {DELTA:g}|v|), and the initial positions are

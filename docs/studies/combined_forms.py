@@ -159,25 +159,25 @@ the judge, that shares no code with hybridsim. The models combine these forms:
 - Names, the order of declaration, the scale and sign of states, and the origin of time are also random. One run in
   ten is stopped in the middle and resumed.
 
-Each model with a set of numbers runs twice. One run is by a named integrator of hybridsim or by the default, and
-the other run is by another random integrator. The first structures are selected so that rare pairs of forms occur
-often enough. Each of these structures is the best of {pool} random structures. The best structure has the most
-pairs that are in fewer than {enough} structures so far. The other structures are not selected. All pairs of forms
-are possible, because every form belongs to a part of a model, and parts are drawn independently.
+Each model with a set of numbers runs by two integrators. One is an integrator of hybridsim or the default, and the
+other is drawn at random. The first structures are selected so that no pair of forms is rare. Each of them is the
+best of {pool} random structures. The best one contains the most pairs that are in fewer than {enough} structures so
+far. The other structures are not selected. All pairs of forms are possible, because every form belongs to a part of
+a model, and parts are drawn independently.
 
-*The judge* (`tests/reference/combined`) is an independent solver. It reads an abstract form of the model, and not
-the model file. It computes the motion by Taylor series for each combination of modes. It finds zeros by dense
-sampling and bisection. At an instant with an event it tries every combination of modes and sides. A combination is
-admissible if its conditions are true just after the instant. The judge also finds impulses by trying all
-combinations. If a run disagrees, the judge computes the motion again in 40 digits. A run is compared only as long
-as the motion is certain. The comparison ends if a guard approaches zero within 1e-6 and turns back. The comparison
-also ends at an instant at which the rules permit several motions.
+*The judge* (`tests/reference/combined`) reads an abstract form of the model, and not the model file. It computes
+the motion by Taylor series for each combination of modes. It finds zeros by dense sampling and bisection. At an
+instant with an event it tries every combination of modes and sides. A combination is admissible if its conditions
+are true just after the instant. The judge also finds impulses by trying all combinations. If a run disagrees, the
+judge computes the motion again in 40 digits. A run is compared only as long as the motion is certain. The
+comparison ends if a guard approaches zero within 1e-6 and turns back. The comparison also ends at an instant at
+which the rules permit several motions.
 
-A run *agrees* under two conditions. First, at each of {points} times all states and discrete states differ from
-those of the judge by at most {allowed:g} of the size of the motion. Second, all monitors fire as often as with the
-judge. Two kinds of runs are counted separately. A run of the first kind stops with a named status before the motion
-of the judge ends. A run of the second kind is wrong, but warns that a jump inside a mode was integrated without
-location.
+A run *agrees* if two conditions are met. First, all states and discrete states are compared at {points} times. They
+differ from those of the judge by at most {allowed:g} of the size of the motion. Second, all monitors fire as often
+as with the judge. Two other kinds of runs are counted separately. A run of the first kind stops with a named status
+before the motion of the judge ends. A run of the second kind is wrong, but warns that a jump was integrated as it
+is written.
 
 """
 

@@ -105,19 +105,19 @@ contacts in {ORDERS} other orders of declaration.
 | --- | --- | --- | --- | --- | --- | --- |
 {table}
 
-If static and kinetic friction are equal, the motion is unique. The check sometimes counts several combinations
-nevertheless. It uses only two derivatives, or none for redundant sets of contacts. It also treats values below 1e-9
-as zero. With static friction above kinetic friction, several outcomes may be possible. The run begins with stick in
-all contacts that may stick, and then releases the contacts whose force exceeds the limit. Differences between the
-orders of declaration are due to rounding. They grow because motions from neighbouring states move apart.
+If static and kinetic friction are equal, the motion is unique. Nevertheless the check sometimes counts several
+combinations. It uses only two derivatives, or none for redundant sets of contacts, and treats values below 1e-9 as
+zero. With static friction above kinetic friction, several outcomes may be
+possible. The run begins with stick in all contacts that may stick, and then releases the contacts whose force
+exceeds the limit. The orders of declaration lead to different results because of rounding. These differences grow
+because neighbouring motions move apart.
 
 ## Work and energy
 
 Over each run the change of the energy v.Mv/2 + q.Kq/2 must equal the work of the forcing minus the work of dampers
-and friction. Each work is an integral over the dense output, by Gauss-Legendre quadrature. The quadrature has 20
-nodes between any two successive times at which a series begins or an event happens. The table gives the difference
-between the two sides, relative to the work of friction. The work of friction is the integral of the sum of f (w.v -
-base).
+and friction. Each work is an integral over the dense output, by Gauss-Legendre quadrature. It has 20 nodes between
+any two successive times at which a series begins or an event happens. The table gives the difference between the
+two sides, relative to the work of friction. The work of friction is the integral of the sum of f (w.v - base).
 
 | law | residual: median | largest | 16 nodes instead of 20 change the work of friction by at most |
 | --- | --- | --- | --- |

@@ -138,9 +138,9 @@ run takes {min(never):.2f} to {max(never):.2f} times as long as without it.
 
 `exact`, `taylor` and `dop853` run from event to event in compiled code, in which an ordinary event takes
 microseconds. Python handles events that need a message or a joint decision, in about a millisecond. Three rows of
-the table have events of this kind:
+the table have such events:
 
-- A quadratic monitor is not available in the closed form of `exact`.
+- A quadratic monitor is not a closed form of `exact`.
 - A monitor of the sliding speed is zero at the same time as the guard of the contact. The monitor and the contact
   are then decided together.
 - At an impact all contacts that are struck together are decided together.

@@ -83,8 +83,8 @@ TEXT = """# Wrong files, wrong command lines
 
 Does a faulty model file or command line ever cause an internal error? {verdict} The script `docs/studies/fuzz.py` ran
 {files} model files and {lines} command lines. They contain typical mistakes of users, editors and scripts, and
-deliberate attacks. No case may cause an internal error, a traceback, a warning of a library, a hang or a file that
-the user did not request. No text of a file may run as code.
+deliberate attacks. No case may cause an internal error, a traceback, a warning of a library, a hang or an unwanted
+file. No text of a file may run as code.
 
 ## Model files
 
@@ -130,8 +130,8 @@ Each case runs in a process that records what the case does:
 These results are faults: an exception, a warning, an undocumented exit code, a failure without a message, output that
 is not JSON under `--json`, and a hang.
 
-All faults that earlier runs found are fixed, and each has a test in `tests/fuzz/test_found.py`. The cause of most
-faults was a number at the end of the range of floating-point numbers, whose square or quotient is infinite. In one
+All faults that earlier runs found are fixed, and each has a test in `tests/fuzz/test_found.py`. Most faults were
+caused by numbers at the end of the range of floating-point numbers, whose square or quotient is infinite. In one
 fault the bound of a guard was not a number, so that the search for a zero never ended. In other faults a message
 contained a very long word. The tests run a few cases of each kind.
 """

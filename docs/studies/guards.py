@@ -166,22 +166,23 @@ The tables below show how many pairs of zeros were found or reported.
 
 `python docs/studies/guards.py` draws {count} random guards, half for `exact` and half for `taylor` (rtol {rtol:.0e}).
 It compares every mode change of the runs with an independent solution, which is called the oracle. The oracle has
-each guard g in closed form, for exactly the numbers that the run uses. It computes depths and zeros in 40 digits.
+each guard g in closed form, for exactly the numbers that the run uses. It computes zeros and distances from zero in
+40 digits.
 
 A model has two modes. The guard of one mode is g, and the guard of the other mode is -g. Therefore the mode changes
 at each zero of g. The next segment of the run starts at this zero, with a guard that is zero by definition.
 
-- For `exact` the guard g is a random combination of the terms that linear modes can produce. These are polynomials
+- For `exact` the guard g is a random combination of terms that linear modes can produce. These are polynomials
   up to degree six, two waves, a damped driven oscillator, decays with waves, and t exp(-t) as a function of time.
 - For `taylor` the guard is a product of up to five factors with a zero. The factors are polynomial or
-  trigonometric, in t or in a state. The product is multiplied by positive functions. The model also has a nonlinear
-  state.
+  trigonometric, in t or in a state. The product is multiplied by positive functions. The model also has a
+  state with a nonlinear rate.
 
 Most guards have one or two *close extremes*. The distance of such an extreme from zero is called the depth. If g
 turns back after it has passed zero, there is a pair of zeros. If g turns back before it reaches zero, there is a
-near miss. The depths of the extremes are spread evenly over the decades from 1e-17 to 1e-1 of the size of the
-guard. For `exact` the size is the largest sum of the absolute values of the terms. For `taylor` it is the largest
-value of the guard. Zeros closer than 1 % of the span count as a pair.
+near miss. The depths are spread evenly over the decades from 1e-17 to 1e-1 of the size of the guard. For `exact`
+the size is the largest sum of the absolute values of the terms. For `taylor` it is the largest value of the guard.
+Zeros closer than 1 % of the span count as a pair.
 
 ## Zeros
 
@@ -189,11 +190,12 @@ value of the guard. Zeros closer than 1 % of the span count as a pair.
 | --- | --- | --- | --- | --- | --- | --- |
 """
 PAIRS = """
-A zero of a pair is *late* if its error exceeds {late:.0e} of the span. This error must also be larger than the
-effect of the error of the guard. The error of the guard is 1e-13 of its size for `exact`, and a tenth of rtol for
-`taylor`. A single zero is *late* if its error exceeds 1e-10 of the span and 1e-10 of the size divided by the slope.
-If the error is more than ten times as large as these limits, the zero counts as missed, and the event as spurious.
-*Off by* is the error in time of single zeros, multiplied by the slope of the guard and divided by its size.
+A zero of a pair is *late* if its error exceeds {late:.0e} of the span, and also exceeds the effect of the error of
+the guard. The error of the guard is 1e-13
+of its size for `exact`, and a tenth of rtol for `taylor`. A single zero is *late* if its error exceeds 1e-10 of the
+span and 1e-10 of the size divided by the slope. If the error is more than ten times as large as these limits, the
+zero counts as missed. Its event counts as spurious. *Off by* is the error in time of single zeros, multiplied by
+the slope of the guard and divided by its size.
 
 ## Pairs, by depth over size
 
@@ -215,13 +217,13 @@ although there is no zero.
 TAIL = """
 ## Error bounds
 
-The deepest pair that was flagged and not found has a depth of {exact:.1e} of the size for `exact`, and {taylor:.1e}
-for `taylor`. The compiled searches use these error bounds:
+The deepest pair that was only flagged has a depth of {exact:.1e} of the size for `exact`, and {taylor:.1e} for
+`taylor`. The compiled searches use these error bounds:
 
 - For `exact` the bound is (16 + 2 J + 2 w s) 2^-53 of the size. J is the number of modal coordinates, w the largest
   rate, and s the time since the last event. In this study the bound is about 4e-15.
 - For `taylor` the bound is 2 (|a_N| + |a_N-1|) + 8 2^-53 sum |a_k|. The a_k are the coefficients of the guard's
-  series on the step. It is at most 6 rtol = {bound:.0e} of the largest value of the guard.
+  series on the step. This bound is at most 6 rtol = {bound:.0e} of the largest value of the guard.
 
 No pair whose depth exceeds ten times the bound is lost. Every other pair {lost}.
 

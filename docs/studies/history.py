@@ -385,13 +385,13 @@ def differing(found: list[dict[str, Any]]) -> list[str]:
 
 HEAD = """# Does a run depend on earlier runs?
 
-Does the result of a run depend on the runs before it? {compared} runs were made after other runs. {differ} of them
-differ from the same run in a new process.
+Does the result of a run depend on earlier runs in the same process? {compared} runs were made after other runs, and
+{differ} of them differ from the same run in a new process.
 
 `python docs/studies/history.py` makes runs of 100 models. They are the models of the package, three chains of blocks,
 and generated models that combine forms at random ([combined forms](combined-forms.md)). Ten of the generated models
 have more than {limit} combinations of modes. For such a model the process adds a combination to its tables when a run
-first reaches it. This page has the figures of {models} models. {many} of them has more than 27 combinations.
+first reaches it. This page has the figures of {models} models, of which {many} has more than {limit} combinations.
 
 For each model one process makes {runs} other runs, in random order and by random integrators:
 
@@ -402,8 +402,9 @@ For each model one process makes {runs} other runs, in random order and by rando
 - Some runs are of another model, or of an equal model in another object.
 
 After 1, 30 and 1000 of these runs, the process makes the compared run with each integrator. After the 1000 runs it
-makes the compared run twice. It repeats the compared runs with an equal model. Then all integrators make the
-compared runs at once, on one thread each. During this time two further threads make other runs.
+makes the compared run twice. It repeats the compared runs with an equal model in another object. Then all
+integrators make the compared runs at the same time, on one thread each. During this time two further threads make
+other runs.
 
 The reference is a run in a process that makes no other run and starts with an empty cache of compiled models.
 Another process makes the run with the cache of the {runs} runs. All results are compared bit for bit: the status,

@@ -58,24 +58,24 @@ def main(total: int) -> None:
 
 TEXT = """# Do impacts gain energy?
 
-Does an impact ever add energy? In {count} random impacts, no impact with one outcome adds energy beyond rounding.
+Does an impact ever add energy? In {count} random impacts, no impact with a single outcome adds energy beyond rounding.
 The largest gain is {most:.1e} of the kinetic energy of the change of velocities.
 
 `docs/studies/impacts.py` draws random mechanisms of up to 7 coordinates with dense mass matrices. Up to 3 gaps
-close at the same instant or are closed before. Each gap has a restitution between 0 and 1. Up to 2 directions have
-friction. The normal impulse at each of these directions is that of one gap, and the coefficient of friction is
-between 0 and 1. Let u- and u+ be the rates before and after the impact. The work of the impulses P is the change of
-kinetic energy, P.(u- + u+)/2. The table gives this work relative to P.G P/2, which is the kinetic energy of the
-change of velocities.
+close at the same instant or are closed before. Each gap has a restitution between 0 and 1. Friction acts in up to 2
+directions. The load of such a direction is the impulse of one gap, and the coefficient of friction is between 0 and
+1. Let u- and u+ be the rates before and after the impact. The work of the impulses P is the change of kinetic
+energy, P.(u- + u+)/2. The table gives this work relative to P.G P/2, which is the kinetic energy of the change of
+velocities.
 
 | gaps | with friction | impacts | rebound reduced | several outcomes | none | largest gain | median loss |
 | --- | --- | --- | --- | --- | --- | --- | --- |
 {rows}
 
 Rounding errors grow with the condition number of G, which is up to 1e4 here. The column "rebound reduced" counts
-impacts in which Newton's law would add energy (Kane's paradox). A run warns in this case. With friction an
-impact may have several outcomes or no outcome. The run then ends with the status `nonunique` or `inconsistent`. See
-[impacts](../explanation/events.md#impacts).
+impacts in which Newton's law would add energy (Kane's paradox). A run with such an impact has a warning. With
+friction an impact may have several outcomes or no outcome. The run then ends with the status `nonunique` or
+`inconsistent`. See [impacts](../explanation/events.md#impacts).
 """
 
 

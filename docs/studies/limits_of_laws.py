@@ -221,12 +221,13 @@ inverse of a contact stiffness. `python docs/studies/limits_of_laws.py` runs the
 | --- | --- | --- | --- | --- |
 {about}
 
-The relative width e is v0 over the largest speed. For a contact stiffness it is the deflection mu N/stiffness over
-the largest displacement. The error is the largest error of x over the run.
+The relative width e is v0 over the largest speed, or the deflection mu N/stiffness over the largest displacement.
+ The error is the largest
+error of x over the run.
 
 ![Error over the width of a law, six laws in three scenes](../images/limits-of-laws.png)
 
-The table compares the theoretical order with the observed order. Both are for the smallest decade of e.
+The table compares the theoretical and the observed order over the smallest decade of e.
 
 | law | {heads} |
 | --- | {" | ".join(["---"] * (3 * len(every)))} |
@@ -261,9 +262,9 @@ additional velocity at the end of this interval.
 
 - `tanh`, `arctan`, `karnopp`: the change takes the time v0/a. The velocity has an error of the order of v0 during
   this time. With `arctan` the change takes longer, and the integral of v0/(a s) over s is of size v0 log(1/v0).
-- `jenkins`, `dahl`, `lugre`: the change takes a distance of the size of 1/stiffness. From rest and with a finite
-  acceleration, this distance takes a time of the size of stiffness^(-1/2). The error of the velocity is of this size
-  too. If a body reverses without stick, a spring contact is therefore a poor model of Coulomb's law.
+- `jenkins`, `dahl`, `lugre`: during the change the body moves by a distance of the size of 1/stiffness. From rest
+  and with a finite acceleration, this takes a time of the size of stiffness^(-1/2). The error of the velocity is of
+  this size too. If a body reverses without stick, a spring contact is therefore a poor model of Coulomb's law.
 
 ## References
 

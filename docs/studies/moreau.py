@@ -218,10 +218,10 @@ is therefore a mean over {neighbours} neighbouring step sizes.
 
 ![Errors over the step](../images/moreau.png)
 
-For positions the table gives the largest error at any time. Velocities jump. If a jump is one step late, the error
-of the velocity during this step is the whole jump. For velocities the table therefore gives the mean error over the
-time. Both errors are relative to the largest value, and the table gives them for the finest step. The order is the
-slope of the error over all steps.
+For positions the table gives the largest error at any time. Velocities jump at impacts. If a jump is one step late,
+the error of the velocity during this step is the whole jump. For velocities the table therefore gives the mean
+error over the time. Both errors are relative to the largest value, and are for the finest step.
+The order is the slope of the error over all steps.
 
 | dry friction | changes of mode | order of x | order of v (L1) | finest step | error of x | error of v | seconds |
 | --- | --- | --- | --- | --- | --- | --- | --- |
@@ -235,10 +235,10 @@ slope of the error over all steps.
 release the friction force does not jump, because static and kinetic friction are equal. At a reversal without a stop
 the body sticks for one step. This error is of first order (`free-decay`). A force that depends on the speed is
 evaluated at the end of the step. This error is of first order too (`belt`). The scenes have no grazing impacts. At
-a grazing impact the error depends on the square root of a parameter, because the time of the impact does.
+a grazing impact the time of the impact, and therefore the error, depends on the square root of a parameter.
 
 - *vibrating table*: a ball is thrown repeatedly. Each flight ends in an accumulation of bounces, and then in rest.
-- *thrown block*: each impact loads the friction. The block slides after the last impact, and then sticks.
+- *thrown block*: each impact loads the friction contact. The block slides after the last impact, and then sticks.
 - *two balls*: one ball is above the other. The upper ball falls on the lower ball, which bounces.
 - *pendulum*: the gap is nonlinear in all states. The pendulum bounces and comes to rest.
 - *shaken mass*: a mass moves between two stops. A spring connects the mass to a block that sticks and slips on a
@@ -248,9 +248,9 @@ a grazing impact the error depends on the square root of a parameter, because th
 
 `hs.chain_on_belt(n, gap={gap:g})` has n blocks of mass 1 on a belt. The friction of each block is 1/(1 + 3|v|).
 Springs connect neighbouring blocks. If a spring is compressed by {gap:g}, its blocks collide with e = 0.5. The run
-lasts {span:g} units of time in steps of {step:g}. Friction and impacts act on the same blocks, so that each step
-solves one problem with n + (n - 1) contacts. A step counts as unsettled if its impulses did not converge to 1e-12
-of the largest impulse. Times are on one core of a machine that also ran other programs.
+lasts {span:g} units of time in steps of {step:g}. Friction and impacts act on the same blocks, so each step solves
+one problem with n + (n - 1) contacts. A step counts as unsettled if its impulses did not converge to 1e-12 of the
+largest impulse. Times are on one core of a machine that also ran other programs.
 
 | n | status | unsettled | bounces | changes of mode | us per step | sweeps per step | least gap |
 | --- | --- | --- | --- | --- | --- | --- | --- |

@@ -41,9 +41,9 @@ takes {least:.2f} to {most:.2f} times as long.
 `python docs/studies/published_speed.py` compares `rk4-dichotomy` and `rk4-sign` with versions for the system of the
 paper alone. numba compiles these versions (`docs/studies/rivals/published_rk4.py`).
 
-- The runs have 100 periods of 1200 steps, and each method is run {turns} times. {machine}
-- For hybridsim, the time is the processor time of two steps: `hs.simulate(..., keep="events")`, and reading the
-  times and states of all events. The method written by hand only records events.
+- The runs have 100 periods of 1200 steps, and the methods run in {turns} turns. {machine}
+- For hybridsim, the time is the processor time of `hs.simulate(..., keep="events")` and of reading the times and
+  states of all events. The method written by hand only records events.
 - Each turn gives one ratio of two times. The table gives the median of the ratios and, in brackets, the range of the
   middle 90 %.
 - If the velocity is set to zero in stick, the method written by hand computes no stages in stick. If the velocity is

@@ -145,13 +145,13 @@ HEAD = """# Random models against references
 Are the errors of runs as small as the tolerance requests? Of {runs} runs of random models, {faults} exceed the
 allowed error.
 
-`python docs/studies/random_models.py` runs 200 random structures with {draws} draws of parameters and initial values
-each. It compares every run with a reference at four times. These are the end of the run and three times between
-steps, which test the dense output.
+`python docs/studies/random_models.py` makes 200 random structures, and runs each with {draws} draws of parameters
+and initial values. It compares every run with a reference at four times. These are the end of the run and three
+times between steps, which test the dense output.
 
 - There are 100 dense linear systems x' = A x + f phi(t) of one to eight states. In some systems the matrix A is
   generic, or oscillatory with about ten turns. In others A is defective. Its chains of equal eigenvalues are
-  transformed by integers, without rounding. In others it differs from a defective matrix by 1e-4 to 1e-15.
+  transformed by integers, without rounding. In the other systems it differs from a defective matrix by 1e-4 to 1e-15.
   In stiff systems the ratio of the rates is from 10 to 1e4, or from 1e4 to 1e8 (only for `exact` and `rodas5p`). The
   forcing phi is zero, constant, a polynomial, an exponential, a sine, or t exp(-e t) cos(w t). The reference
   is a matrix exponential in integers of {bits} bits.
@@ -160,11 +160,11 @@ steps, which test the dense output.
 - There are 20 coupled stiff nonlinear systems of two to four states that approach known waves. The ratios of rates
   are from 10 to 1e4 in 14 of them, and from 1e4 to 1e8 in 6 of them (`rodas5p`).
 
-The error is the largest error of all states, relative to the largest state of the run, in units of rtol. The
-tolerance is {asked}. `exact` has no tolerance. The error of `exact` is measured in another unit, a sum of two
-parts. The first part is 2^-53 of the largest state. For the second part, all numbers of the model are changed by a
-relative 2^-53. This part is the largest change of the motion in three trials. No floating-point computation can
-avoid an error of this size. The change of basis in `exact` may multiply such an error by a hundred.
+The error of a run is the largest error of a state, relative to the largest state of the run. It is given in units
+of rtol. The tolerance is {asked}. `exact` has no tolerance. The error of `exact` is measured in another unit, a sum
+of two parts. The first part is 2^-53 of the largest state. For the second part, all numbers of the model are
+changed by a relative 2^-53. This part is the largest change of the motion in three trials. No floating-point
+computation can avoid an error of this size. The change of basis in `exact` may multiply such an error by a hundred.
 
 A run is *within* the tolerance if its error is at most {within:.0f} units. For `exact` the limit is {exact:.0e}
 units, which is 1e-12. A method controls only the error of each step. The effect of these errors at the end depends

@@ -66,18 +66,18 @@ def tell(number: int, refused: str, verdicts: list[Verdict], seconds: float) -> 
 
 HEAD = """# Random structures with events
 
-Do runs of random models with events agree with a method that does not locate events? Of {all} draws {agree} agree.
-{sensitive} are sensitive to the start, {unresolved} are unresolved, and {disagree} disagree.
+Do runs of random models with events agree with an independent method that does not locate events? Of {all} draws
+{agree} agree. {sensitive} are sensitive to the start, {unresolved} are unresolved, and {disagree} disagree.
 
 `python docs/studies/random_structures.py` makes random models and compares each run with another method. The other
 method has its own code and its own mode decisions. A structure has one to four masses with springs, dampers and
 forces (constant, sines, square waves). It also has up to three kinds of components:
 
-- One to three friction contacts. They are on the ground, on a belt or between bodies. Their laws are Coulomb,
+- One to three friction contacts. They act on the ground, on a belt or between bodies. Their laws are Coulomb,
   static above kinetic, Stribeck, asymmetric and viscous. The loads may vary and become zero.
 - Switching surfaces with a random field on each side.
 - Unilateral contacts with restitution, with a wall, a moving wall or another body.
-- Automata, which are bilinear springs, hysteresis, kicks by a reset, saturations and a thermostat.
+- Components with modes. They are bilinear springs, hysteresis, kicks by a reset, saturations and a thermostat.
 - Monitors.
 
 The numbers of each structure are drawn {draws} times, and each set of numbers is called a draw. The draws are run
@@ -88,14 +88,14 @@ The *other method* is time stepping without location of events (`tests/reference
 of a step satisfy the laws at the end of the step. The method is of first order. It runs with 2003, 4327 and 8923
 steps. If these runs are not accurate enough, it uses up to 568 019 steps. All these numbers of steps are prime. Any
 two runs therefore have only the start and the end in common, so their errors are independent. Positions are
-compared at 100 times. For any two successive runs, the difference is extrapolated to the finest step. Let d be the
-largest extrapolated difference. If the method is of order one, d equals its error. The verdicts are defined as
-follows:
+compared with those of a run of hybridsim at 100 times. For any two successive runs of the other method, the
+difference is extrapolated to the finest step. Let d be the largest extrapolated difference. If the method is of
+order one, d equals its error. The verdicts are defined as follows:
 
-- A run *agrees* if it differs by at most 3 d at all times. In addition d must be below 0.5 % of the motion, or below
-  2 % with the most steps. The run by the other integrator must end with the same status. The difference of
-  the two runs by hybridsim must not be larger than the effect of a change of the start by 1e-6.
-- A run is *sensitive* from a time on if the other method depends too strongly on the start. After this time, a
+- A run *agrees* if it differs by at most 3 d at all times. In addition d must be below 0.5 % of the motion, or
+  below 2 % in runs with the most steps. The run by the other integrator must end with the same status. The
+  difference of the two runs by hybridsim must not be larger than the effect of a change of the start by 1e-6.
+- A run is *sensitive* from the time on at which the other method depends too strongly on the start. After this time, a
   change of the start by 1e-5 changes the result of the other method by more than 3e-3. The causes are grazing
   impacts, stops that barely happen, and chaos. The run must agree up to this time.
 - A run is *unresolved* if the other method has not converged at its smallest step.

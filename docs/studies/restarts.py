@@ -69,32 +69,32 @@ Does a run start correctly on a guard after an event? Of {clear} clear restarts,
 {missed} missed an event.
 
 `python docs/studies/restarts.py` makes random restarts on and near guards. It compares each restart with exact
-arithmetic, for exactly the numbers that the run uses. This solution is called the oracle. In each restart some
+arithmetic for the same numbers, called the oracle. In each restart some
 quantities are zero by definition ([events](../explanation/events.md)). They are zero in the oracle too.
 
 A restart is *clear* if the first coefficient of the true series of the guard is more than twice the error bound of
 the engine. Coefficients that are zero by definition are skipped. The verdict on a clear restart must be the true
-verdict. All other restarts count as *inside the error bound*. They are counted separately and must follow another
-rule. A coefficient within its bound counts as zero, and the next coefficient decides. If no coefficient decides,
-the verdict is "undecided at rounding", and the mode does not change.
+verdict. All other restarts count as *inside the error bound*. They are counted separately and follow another rule.
+A coefficient within its bound counts as zero, and the next coefficient decides. If no coefficient decides, the
+verdict is "undecided at rounding", and the mode does not change.
 
 ## Verdicts
 
 The recurrences of the engine give the series and the bounds. The true series are computed with integers of {bits}
-bits. The expressions and the state are random. There is one structure for 500 draws. A constant is added to the
-guard. The value of the guard at the state is then zero to the last bit, or differs from zero by 1e-19 to 1. In
-three of ten restarts the rate of the guard is changed in this way too. The oscillator is described under "Whole
-runs". Its parameters vary over decades, and its time over up to 10^6 periods. Its applied force is at the limit of
-friction or very near to it.
+bits. The expressions and the state are random, with one structure for 500 draws. A constant is added to the guard.
+The value of the guard at the state is then zero to the last bit, or differs from zero by 1e-19 to 1. In three of
+ten restarts the rate of the guard is changed in this way too. The oscillator is described under "Whole runs". Its
+parameters vary over decades, and its time over up to 10^6 periods. Its applied force is at the limit of friction or
+very near to it.
 
 | restart | judged | clear | spurious | missed | inside, decided | undecided | against the rule | error/bound |
 | --- | --- | --- | --- | --- | --- | --- | --- | --- |
 """
 SEARCHES = """
-A restart is *spurious* if the verdict of the engine is that the guard fires, but the oracle does not agree. It is
-*missed* in the opposite case. *Inside, decided* means that the first coefficient is within its bound, and a higher
-derivative decides. The last column is the largest error of a coefficient of the engine, divided by its bound. The
-bounds are valid if this quotient is below 1.
+A restart is *spurious* if the engine finds that the guard fires, but the oracle does not. It is
+*missed* in the opposite case. *Inside, decided* means that the first coefficient is within its bound, so that a
+higher derivative decides. The last column is the largest error of a coefficient of the engine, divided by its
+bound. The bounds are valid if this quotient is below 1.
 
 ## Searches
 
@@ -107,7 +107,7 @@ integers.
 | --- | --- | --- | --- | --- | --- | --- | --- | --- |
 """
 RUNS = """
-A search is *open* if it reports that the function may be zero at some time, because it is within its error bound.
+A search is *open* if the function may be zero at some time, because it is within its error bound.
 The general method, which samples the guard, then searches again. *Start inside* means that the leading coefficient
 at the start is within its bound.
 
@@ -123,7 +123,7 @@ mu_s = mu_k. In the second kind mu_s is greater than mu_k. In the third kind mu_
 """
 TAIL = """
 An event is *late* if its error exceeds 1e-5 of a period. A slip after a release is *cut short* if it lasts less
-than half of its true duration. The cause of a short slip is a wrong direction of slip.
+than half of its true duration. The cause is then a wrong direction of slip.
 
 Run `python docs/studies/restarts.py [restarts]` to repeat the study. It takes {minutes:.0f} minutes on one core.
 """

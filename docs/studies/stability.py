@@ -147,28 +147,28 @@ def page(
     adaptives = "\n".join(f"| {100 * w:g} % | {100 * e:+.2f} % | {n:.0f} |" for w, e, n in rows)
     return f"""# Limits of fixed steps and of zones around zero velocity
 
-How long may a fixed step be, and how wide may a zone around zero velocity be? In the two systems of this study, 250
-steps per period are enough, and the zone may be up to 0.5 % of the largest speed. This is for `rk4-dichotomy` with
-the velocity set to zero in stick. The table below has the values for all methods.
+How long may a fixed step be, and how wide may a zone around zero velocity be? In the two systems of this study,
+`rk4-dichotomy` needs 250 steps per period and a zone of at most 0.5 % of the largest speed. The velocity is then
+set to zero in stick. The table below has the values for all methods.
 
 The user chooses the step h and the width of a zone around v = 0, in which the velocity counts as zero. The width of
 the zone is eps_v of `rk4-dichotomy`, or v0 of a regularized law. `python docs/studies/stability.py` measures the
-limits of step and zone. The systems are the reference model (`dfcs`, at several r and F0/N) and the block on a
+limits of step and zone. The two systems are the reference model (`dfcs`, at several r and F0/N) and the block on a
 `belt`. The case r = 0.6 with F0/N = 0.75 is P1 of the [comparison](../explanation/comparison.md), and r = 0.64 with
 F0/N = 0.55 is P2.
 
-Each point is a run that starts on the exact steady motion. `exact` computes this motion for the reference model, and
-`steady_state` for the belt. The run lasts 40 periods, of which the last 10 are evaluated. With Karnopp's band the
-run lasts 12 periods, of which the last 4 are evaluated. With `rk4-sign` it lasts 100 periods, of which the last 50
-are evaluated. A run is **right** if the number of stops is correct and the amplitude is within 1 % in each
-evaluated period. The width of a zone is given as a share of the largest relative speed.
+Each run starts on the exact steady motion. `exact` computes this motion for the reference model, and `steady_state`
+for the belt. The run lasts 40 periods, of which the last 10 are evaluated. With Karnopp's band the run lasts 12
+periods, of which the last 4 are evaluated. With `rk4-sign` it lasts 100 periods, of which the last 50 are
+evaluated. A run is **right** if the number of stops is correct and the amplitude is within 1 % in each evaluated
+period. The width of a zone is given as a share of the largest relative speed.
 
 ## Recommended values
 
 These values hold for the two systems of this study. One system is a body on a spring with Coulomb friction and
 harmonic forcing. The other is a block on a belt with friction that decreases with the speed. Other systems may need a
 narrower zone. Examples are a body that drifts, static friction above kinetic friction, and several contacts. For
-such a system, compare two runs, one of them with half the width of the zone. This page does not cover impacts.
+such a system, compare a run with a run in a zone of half the width. This page does not cover impacts.
 
 | method | zone, as a share of the largest speed | steps per period, at least | beyond |
 | --- | --- | --- | --- |
@@ -184,8 +184,8 @@ If the largest speed is 0.1 m/s, a share of 0.5 % is eps_v = 5e-4 m/s. Options a
         --option stick_velocity=zero --option steps_per_period=500
 
 `stick_velocity=kept` selects the method in the row with the kept velocity. `model.regularized("tanh", v0=5e-5)` and
-`model.regularized("karnopp", v0=5e-4)` are the regularized laws, for `rk4-sign` or any other integrator. The law
-tanh cannot represent static friction that is larger than kinetic friction. A model with such friction is an error.
+`model.regularized("karnopp", v0=5e-4)` are the regularized laws, for `rk4-sign` or any other integrator. Static
+friction must not be larger than kinetic friction if you use tanh. Otherwise an error is raised.
 
 You do not know the largest speed in advance. It is small just above the threshold of motion, and a zone then causes
 the largest errors. Run the model once, read the largest speed, and compare the zone with it. Near the threshold (F0/N
@@ -203,8 +203,8 @@ the largest errors. Run the model once, read the largest speed, and compare the 
 *`belt`, with the period T = 12.0010 of its limit cycle. The star marks the width 8e-4 m/s, as a share of the
 largest speed in the picture above.*
 
-The table gives the largest width up to which all narrower zones are right. The last column is 8e-4 m/s as a share
-of the largest speed of the case.
+The table gives a width. All zones up to this width are right. The last column gives 8e-4 m/s as a share of the
+largest speed.
 
 | case | zeroed: eps_v | kept: eps_v | tanh: v0 | karnopp: v0 | 8e-4 m/s |
 | --- | --- | --- | --- | --- | --- |
@@ -213,8 +213,8 @@ of the largest speed of the case.
 These runs have 2000 steps per period, and 20000 with tanh. "None" means that the error exceeds 1 % at the smallest
 width at which RK4 is stable. Narrower zones are right although the velocity chatters, as the picture below shows.
 
-The next table is for a zone with a third of this width. It gives the number of steps per period above which all runs
-are right.
+The next table is for a zone with a third of the width in this table. It gives the number of steps per period above
+which all runs are right.
 
 | case | {heads} |
 | {rule} |
@@ -234,14 +234,14 @@ equal parts of a step. All other results of this page are from one run each.
 If the velocity is set to zero, the published setting is right in every case. Its zone is then at most 4 % of the
 largest speed, and 11 % would also be right. If the velocity is kept, as in Eq. 4 of the paper, the setting is right
 for a body that never sticks. It is also right for r = 0.6 with F0/N = 0.75 and above. It is wrong in every other
-case. The error grows towards the threshold. The map of deviations in the paper has its ridge there. For tanh with
+case. The error grows towards the threshold. The ridge of the map in the paper is there. For tanh with
 v0 = 8e-4 m/s, the result is wrong in half of the cases. The dichotomy needs only a fifth of the 1200 steps. If the
 zone is too wide, more steps do not help. `rk4-sign` may need ten times as many steps.
 
 ![How the boundary moves with r and F0/N](../images/stability-moves.png)
 
 *On each line the error of the amplitude is 1 %. At some points near the largest speed there are two lines, one
-above the other, because the error of tanh changes its sign. Between these lines the result is right by accident.*
+above the other. The error of tanh changes its sign between them, so the result there is right by accident.*
 
 If the velocity is set to zero, the limit of the zone is an almost constant share of the largest speed. It is 9 to 15 %
 if the body sticks, and 1 to 2 % if the body only reverses. If the velocity is kept, the limit is 0.2 to 0.8 %, and
@@ -257,17 +257,17 @@ Let X be the amplitude, V the largest speed, a the deceleration before a stop, a
 maps the place of a stop to the place of the next stop. G_x is the derivative of G with respect to the place. G_v is
 the derivative of G with respect to an outward speed at the release.
 
-**Velocity set to zero, zone too wide.** Stops are too early. If a body stops at the speed eps_v, its way is too short
-by eps_v^2/(2 a). This happens at every stop. The limit is therefore at eps_v^2/(2 a) = 0.01 X (1 - G_x). On the belt
-the extreme of x is before the stop, when the relative speed is that of the belt. On the belt the limit is therefore
-at (eps_v - v_belt)^2/(2 a) = 0.02 X. This formula gives 41 % of V, and the measured limit is 36 %. If eps_v is
-above V, the body sticks as soon as the applied force permits stick. This false stick causes an error of the
-amplitude of 75 %.
+**Velocity set to zero, zone too wide.** Stops are too early. If a body stops at the speed eps_v, its way to the
+stop is too short by eps_v^2/(2 a). This happens at every stop. The limit is therefore at eps_v^2/(2 a) = 0.01 X (1
+- G_x). On the belt the extreme of x is reached before the stop, when the relative speed is that of the belt. There
+  the limit is at (eps_v - v_belt)^2/(2 a) = 0.02 X. This formula gives 41 % of V, and the measured limit is 36 %.
+  If eps_v is above V, the body sticks as soon as the applied force permits stick. This false stick causes an error
+  of the amplitude of 75 %.
 
 **Velocity kept, zone too wide.** The body creeps in stick. It moves at up to eps_v when it should stick, by the
 distance d = eps_v t_stick. It then begins its slip with the speed eps_v in the wrong direction. The limit of the
 zone is at eps_v (t_stick + (G_x t_stick + G_v)/(1 - G_x)) = 0.01 X. On the belt the friction decreases with the
-speed. If a slip begins with a wrong speed, it moves away from the true slip. The limit is therefore 0.34 %.
+speed. A slip that begins with a wrong speed moves away from the true slip. The limit is therefore 0.34 %.
 
 | case | early stop: theory | measured | creep: theory | measured | late release: theory, at most | measured |
 | --- | --- | --- | --- | --- | --- | --- |
@@ -284,12 +284,12 @@ sticks at the reversal (F0/N = 1).
 continues with a speed outside of the zone. In the reference model this has no effect if the step is short enough.
 On the belt, with fewer than about 90 steps per period, sticks are missed.
 
-**Step too long.** Releases are late, and stops are missed. A release is placed at the end of its step. If a release
-is a whole step late, the slip ends at another place. The table gives this limit under "late release: theory". The
-measured number of steps is lower, because a release is rarely a whole step late. With fewer than 10 steps per
-period stops are missed. Then the velocities at both ends of a step have the same sign, or the state after the
-bisection is beyond the next release. On the belt a trial step beyond v = 0 still uses the friction law for the side
-before v = 0. This law, 1/(1
+**Step too long.** Releases are late, and stops are missed. A release is placed at the end of its step. If the
+release is a whole step late, the slip ends at another place, which gives the limit in the table ("late release:
+theory"). The measured limit is lower, because a release is rarely a whole step late. With fewer than 10 steps per
+period stops are missed. There are two causes. The velocities at both ends of a step have the same sign, or the
+state after the bisection is beyond the next release. On the belt a trial step beyond v = 0 still uses the friction
+law for the side before v = 0. This law, 1/(1
 + delta v), has a pole at v = -1/delta. The step reaches the pole if h > 1/(delta a), which is the case with fewer
 than 55 steps per period. With fewer than about 30 steps the motion grows without bound.
 
@@ -300,7 +300,7 @@ to 2 mu N h/m. The error of the amplitude is of first order in h. It is larger f
 v0 artanh(e/(mu N)). At v = 0 the law has its largest rate, mu N/(m v0). Classic RK4 is stable if its step h times
 this rate is at most 2.785 (dotted line). At smaller v0, below this line, the velocity chatters. The amplitude
 becomes wrong only at a still smaller v0. The friction force is bounded by mu N. For very small v0 the result is
-therefore that of `rk4-sign` with the same step. The black line then approaches the limit of `rk4-sign`.
+therefore the same as with `rk4-sign`, and the black line approaches its limit.
 
 An adaptive method chooses its own step. The table is for `dop853` at rtol = 1e-6 and the reference model.
 
@@ -309,9 +309,9 @@ An adaptive method chooses its own step. The table is for `dop853` at rtol = 1e-
 {adaptives}
 
 **Karnopp's band.** The body enters the band at the speed v0. Stops are therefore too early, as with the velocity
-set to zero. The limit is the same if the body sticks. The events are located, so the step has almost no effect. On
-the belt the body first has to cross the band, while the friction force is at its limit. Its slip is therefore late,
-and the limit is 1.1 %.
+set to zero, and the limit is the same if the body sticks. The events are
+located, so the step has almost no effect. On the belt the body first has to cross the band, while the friction
+force is at its limit. Its slip is therefore late, and the limit is 1.1 %.
 """
 
 

@@ -167,7 +167,7 @@ def page(found: dict[str, Counter[str]]) -> str:
         [
             "# Profile of two short runs",
             "",
-            "Which part of the work takes the time of a short run?",
+            "Which part of the work takes the most time in a short run?",
             *(
                 f"In {name} by `{SCENES[name]}` the largest part is *{each.most_common(1)[0][0]}*, with "
                 f"{100.0 * each.most_common(1)[0][1] / each.total():.1f} % of the time."
@@ -175,8 +175,8 @@ def page(found: dict[str, Counter[str]]) -> str:
             ),
             "",
             "`python docs/studies/where_time_goes.py` runs a scene of [the study of speed](speed.md) repeatedly.",
-            "The program perf records at short intervals which function runs. Such a record is a sample. A "
-            "run is a call of `simulate`, followed by reading the times of all events. The",
+            "The program perf records at short intervals which function runs, as a sample. A run is a call "
+            "of `simulate`, followed by reading the times of all events. The",
             f"tolerance of `taylor` is {RTOL:g}. The table gives the share of the samples in per cent. {machine()}",
             "",
             f"| part | {head} |",

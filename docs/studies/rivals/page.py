@@ -122,7 +122,7 @@ def _missed(found: Found) -> str:
     missed = [f"{r.what} on {r.scene} ({r.verdict.strip('*')})" for r in with_aim if r.verdict != "yes"]
     if not missed:
         of_all = f"All {len(with_aim)} aims are" if len(with_aim) > 1 else "The aim is"
-        return f"{of_all} met in this run, by the least times and by the medians."
+        return f"{of_all} met in this run, by the shortest times and by the medians."
     return f"Of {len(with_aim)} aims {len(missed)} are not met in every way. They are {', '.join(missed)}."
 
 

@@ -110,10 +110,10 @@ def claim_figure_4(curves: Curves) -> Claim:
     verdict = Verdict.REPRODUCED if enough and also else Verdict.SHAPE if enough else Verdict.NOT
     counts = ", ".join(f"{m}: {row['converged at 1200']} of {len(CASES)}" for m, row in without.items())
     why = (
-        f"With stick ({closest}) A and E change by less than 0.1 % from h0 = "
-        f"{with_[closest]['latest']:.0f} on in all {len(CASES)} cases. At h0 = 1200, A is within "
-        f"{100 * with_[closest]['largest error']:.2g} % of the exact A. Without stick fewer cases have settled at "
-        f"h0 = 1200 ({counts}), because chatter is of first order in the step."
+        f"With stick ({closest}) A and E change by less than 0.1 % from h0 = {with_[closest]['latest']:.0f} "
+        f"steps per period on, in all {len(CASES)} cases. At h0 = 1200, A is within "
+        f"{100 * with_[closest]['largest error']:.2g} % of the exact A. Without stick fewer cases have "
+        f"settled at h0 = 1200 ({counts}), because chatter is of first order in the step."
     )
     return Claim(
         "figure 4",

@@ -29,21 +29,21 @@ _CAPTIONS = {
     "figure 4": "Each line is a case. Solid lines are for different r, dashed lines for different N, and dotted "
     "lines for different F0. The black line is for a point on the ridge of Figure 10.",
     "figure 5": "The curves are the results of these cases over eps_v. The grey line is the published setting.",
-    "figure 6": "The left panel shows the run time. The right panel shows the number of evaluations, on which "
-    "other programs have no effect.",
+    "figure 6": "The left panel shows the run time. The right panel shows the number of evaluations, which other "
+    "programs on the machine do not change.",
     "figure 7": "The grey mark shows the claim of +225 %.",
     "figure 10": "The first two columns are for the published A2, with the velocity in stick kept and set to "
     "zero. The last column is for the exact A2.",
     "figure 11": "These are the maps of Figure 10 for the energy.",
     "figure 12": "Without stick the force jumps between its limits. With v kept the body creeps in stick.",
-    "figure 13": "The body does not stick in this case, so that all columns are equal.",
+    "figure 13": "The body does not stick in this case, so all columns are equal.",
     "text": "The deviation is of first order in the step. It tends to zero with the step, because the computed "
     "motion tends to the motion with stick.",
 }
 _WIDTH = 120
 _PAIR = (
-    "In each pair of methods, the first is the method without stick, and the second is the reading of the method with "
-    "stick."
+    "In each pair of methods, the first is the method without stick. The second is the reading of the "
+    "method with stick."
 )
 
 
@@ -76,30 +76,30 @@ def _head(study: Study, claims: tuple[Claim, ...]) -> str:
     return f"""\
 # He et al. 2026, claim by claim
 
-When must a model include stick-slip? The map in the paper does not answer this question, because it shows the size
-of the step ({SOURCE}). For small steps, the motion of the equation without stick approaches the motion with stick.
-The values of the map therefore decrease with the step. The motion, the spectrum and the reduction to (r, F0/N) in
-the paper are right. The run times in the paper are those of one implementation.
+When must a model include stick-slip? The map in the paper does not answer this question, because its values depend
+on the size of the step ({SOURCE}). For small steps, the motion that is computed without stick approaches the motion
+with stick. The values of the map therefore decrease with the step. The motion, the spectrum and the reduction to
+(r, F0/N) in the paper are right. The run times in the paper are those of one implementation.
 
-This study computes every figure again with our implementation of the published method (`rk4-dichotomy`, and
-`rk4-sign` for "stick-slip not considered"). The paper leaves details of the method open. The study runs the method
-with each choice of these details, called a reading, and compares the results with the exact motion (`exact`). The
-sections after the claims give results that do not depend on a step. They show which motions stop, for how long, and
-how large the errors of models without stops are.
+This study computes every figure again with our implementation of the published method. It consists of
+`rk4-dichotomy`, and of `rk4-sign` for "stick-slip not considered". The paper leaves details of the method open. The
+study runs the method with each choice of these details, called a reading, and compares the results with the exact
+motion (`exact`). The sections after the claims give results that do not depend on a step. They show which motions
+stop, for how long, and how large the errors of models without stops are.
 
 | figure | claim | verdict |
 | --- | --- | --- |
 {rows}
 
 **Terms.** r is the frequency ratio omega/omega_n. A is half the range of x in a period, and E is the integral of
-x**2 over a period. A0 and E0 are the values for the motion without friction. A1 and E1 are the values for
-"stick-slip not considered" (`rk4-sign`), and A2 and E2 the values for stick-slip considered. A_D is
+x**2 over a period. A0 and E0 belong to the motion without friction. A1 and E1 belong to "stick-slip not considered"
+(`rk4-sign`), and A2 and E2 to stick-slip considered. A_D is
 |A1 - A2|/A2, and E_D is defined in the same way. The paper leaves these details of the dichotomy open:
 
 - *v kept* or *v zero*: in stick the velocity of the body is kept, or set to zero.
 - *release step* or *located*: the release is at the next step, or when the applied force reaches the limit.
 - *force by step* or *by stage*: the direction of friction is chosen once per step, or at each stage of RK4. For A1
-  these choices are called *sign by step* and *by stage*.
+  these choices are called *sign by step* and *sign by stage*.
 - *full-step* or *rest-of-step*: the step after an event is a full step, or the rest of the step of the event.
 
 One command makes this page, its pictures and the [verdicts as data](he2026.json):
@@ -227,11 +227,11 @@ def _timed_map(study: Study, picture: str) -> str:
             "",
             f"The map has the steady amplitude and energy at {study.timed_map.side} x {study.timed_map.side} "
             f"points. Each value is from a run of {facts['settling']}. All methods use the same",
-            "threads in the same run, and the time includes all costs of a point. `exact` runs the whole map as one",
+            "threads in the same run. The time includes all costs of a point. `exact` runs the whole map as one",
             "`hs.sweep(..., after=100)`. The other methods run a random sample of the points, one by one, which adds a",
             "millisecond per point. The errors in the table are those of this sample. The reference is the "
             "exact motion after all changes have decayed to",
-            'rounding. The method "shooting" is `hs.steady_state`, which finds the orbit without a long run and also',
+            'rounding. The method "shooting" is `hs.steady_state`. It finds the orbit without a long run and also',
             "determines its kind.",
             "",
             "| method | ms per point | points | median error of A | largest of A | of E | time, `exact` = 1 |",
@@ -248,8 +248,8 @@ def _how(study: Study) -> str:
         [
             "## Size of the study",
             "",
-            f"The study was run in its {study.size.name} size. Runs have {study.size.periods} periods from "
-            "rest, and A and E are",
+            f"The study was run in its {study.size.name} size. Runs have {study.size.periods} periods from rest. "
+            "A and E are",
             f"those of the last {study.size.last} periods. Without stick the motion does not repeat, so one",
             f"period is not sufficient. {_PAIR} The study ran on {study.workers} threads.",
             "",

@@ -140,10 +140,10 @@ def claim(found: Reduction) -> Claim:
     why = (
         "With `exact` A, E and the stick fraction depend only on (r, F0/N), to "
         f"{max(found.rounding.values()):.0e} over {_SAMPLES} points and three loads. Without stick A and E "
-        "also depend only on (r, F0/N), apart from the chatter. The reduction fails if the method or the "
-        "law contains a velocity in m/s. With eps_v = 8e-4 and v kept, A/A0 varies by "
-        f"{100 * literal['spread of A/A0']:.2g} % over F0 = {FORCES[0]:g} to {FORCES[-1]:g} N. With a "
-        f"Stribeck velocity A/A0 varies by {100 * stribeck:.2g} %."
+        "also depend only on (r, F0/N), apart from the chatter. The reduction fails if eps_v or a law is "
+        f"given in m/s. With eps_v = 8e-4 and v kept, A/A0 varies by {100 * literal['spread of A/A0']:.2g} % "
+        f"over F0 = {FORCES[0]:g} to {FORCES[-1]:g} N. With a Stribeck velocity A/A0 varies by "
+        f"{100 * stribeck:.2g} %."
     )
     return Claim(
         "figures 8, 9",
