@@ -9,6 +9,7 @@ from hybridsim.analysis import Fit as Fit
 from hybridsim.analysis import LawComparison as LawComparison
 from hybridsim.analysis import LawFits as LawFits
 from hybridsim.analysis import Linearization as Linearization
+from hybridsim.analysis import LyapunovExponents as LyapunovExponents
 from hybridsim.analysis import Record as Record
 from hybridsim.analysis import Sensitivities as Sensitivities
 from hybridsim.analysis import SteadyState as SteadyState
@@ -26,6 +27,7 @@ from hybridsim.analysis import fit as fit
 from hybridsim.analysis import fit_laws as fit_laws
 from hybridsim.analysis import frequency_response as frequency_response
 from hybridsim.analysis import linearize as linearize
+from hybridsim.analysis import lyapunov_exponents as lyapunov_exponents
 from hybridsim.analysis import sensitivities as sensitivities
 from hybridsim.analysis import steady_state as steady_state
 from hybridsim.analysis import sweep as sweep

@@ -37,7 +37,7 @@ def test_the_lines_of_the_readme_run(tmp_path: Path) -> None:
     [
         ("index.md", 2),
         ("reference/python.md", 20),
-        ("reference/asking.md", 10),
+        ("reference/asking.md", 11),
         ("how-to/questions.md", 9),
         ("how-to/choose-an-integrator.md", 5),
         ("how-to/relays.md", 8),

@@ -8,6 +8,7 @@ from hybridsim.analysis.continuation import Branch, continuation
 from hybridsim.analysis.equilibria import Equilibrium, Linearization, equilibria, linearize
 from hybridsim.analysis.fit import Fit, Record, Unknown, fit
 from hybridsim.analysis.laws import LawComparison, LawFits, compare_laws, fit_laws
+from hybridsim.analysis.lyapunov import LyapunovExponents, lyapunov_exponents
 from hybridsim.analysis.steady import SteadyState, steady_state
 from hybridsim.analysis.suite import SuiteComparison, compare_suite
 from hybridsim.analysis.sweep import Sweep, bifurcation, frequency_response, sweep
@@ -22,6 +23,7 @@ __all__ = [
     "LawComparison",
     "LawFits",
     "Linearization",
+    "LyapunovExponents",
     "Record",
     "Sensitivities",
     "Series",
@@ -40,6 +42,7 @@ __all__ = [
     "fit_laws",
     "frequency_response",
     "linearize",
+    "lyapunov_exponents",
     "sensitivities",
     "steady_state",
     "sweep",

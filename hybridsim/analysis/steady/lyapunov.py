@@ -1,13 +1,12 @@
-"""This module computes the largest Lyapunov exponent of a motion with events.
+"""This module follows directions of change along a motion, and measures how much each of them grows.
 
-It uses Benettin's method (G. Benettin, L. Galgani, A. Giorgilli, J.-M. Strelcyn, Meccanica 15 (1980) 9,
-doi:10.1007/BF02128236), with the saltation matrices of P. C. Mueller, Chaos, Solitons and Fractals 5 (1995)
-1671, doi:10.1016/0960-0779(94)00170-U.
+The directions are made orthogonal again after each part of the motion (G. Benettin, L. Galgani, A. Giorgilli,
+J.-M. Strelcyn, Meccanica 15 (1980) 9, doi:10.1007/BF02128236). Events are passed by the saltation matrices of
+P. C. Mueller, Chaos, Solitons and Fractals 5 (1995) 1671, doi:10.1016/0960-0779(94)00170-U.
 """
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -15,10 +14,67 @@ import numpy as np
 from hybridsim.analysis.steady.motion import Motion, Point, point_at_end
 from hybridsim.analysis.variations.carried import Carrier
 from hybridsim.analysis.variations.directions import Directions
+from hybridsim.analysis.variations.refused import refuse
+from hybridsim.errors import SimulationError
 
-_STRETCHES = 60
-_PERIODS = 5  # in each
-_SMALLEST = 1e-280  # a smaller change has been reduced to nothing by stick
+_RESOLVED = 1e-11  # of the largest factor of a part: a smaller one cannot be told from rounding errors
+_LARGEST = 1e100  # factor of a part
+_HALVINGS = 12  # of a part whose factors are not resolved
+_PARTS = 60  # of the motion whose largest exponent is found
+_PERIODS = 5  # in each of them
+
+
+class Growth:
+    """Orthogonal directions of change that are carried along a motion.
+
+    Parameters
+    ----------
+    motion : the model and the options of its runs.
+    point : the start of the motion.
+    count : number M of directions.
+    scale : (n + d,) sizes of the states and discrete states, in which lengths and angles are measured.
+    """
+
+    def __init__(self, motion: Motion, point: Point, count: int, scale: np.ndarray) -> None:
+        self.motion, self.point, self.scale = motion, point, scale[:, None]
+        generic = np.random.default_rng(0).standard_normal((len(scale), count))
+        generic[:, 0] = 1.0
+        self.directions = np.linalg.qr(generic)[0]
+        self.count = count
+
+    def over(self, duration: float, halvings: int = _HALVINGS) -> np.ndarray:
+        """Follow the motion for a duration, and return the logarithm (M,) of each direction's growth.
+
+        A direction that shrinks to nothing, or to less than rounding errors of the others in a small part of the
+        duration, has the logarithm -inf and is not followed any longer.
+        """
+        start, before = self.point, self.directions
+        factors = self._factors(duration)
+        is_resolved = factors > _RESOLVED * factors.max(initial=0.0)
+        if halvings and not (is_resolved.all() and factors.max(initial=0.0) < _LARGEST):
+            self.point, self.directions = start, before
+            return self.over(0.5 * duration, halvings - 1) + self.over(0.5 * duration, halvings - 1)
+        self.directions = self.directions[:, is_resolved]
+        lost = np.full(self.count - is_resolved.sum(), -np.inf)
+        return np.concatenate([np.log(factors[is_resolved]), lost])
+
+    def _factors(self, duration: float) -> np.ndarray:
+        """Follow the motion for a duration, and return the factor by which each direction has grown."""
+        n, motion, before = len(self.point.x), self.motion, self.directions * self.scale
+        solution = motion.run(self.point, duration)
+        self.point = replace(point_at_end(solution), at=self.point.at + duration)
+        if not before.shape[1]:
+            return np.zeros(0)
+        refuse(solution)
+        constant = np.zeros((len(motion.model.parameters), before.shape[1]))
+        carried = Carrier(solution).carry(Directions(before[:n], before[n:], constant))
+        change = np.concatenate([carried.x, carried.discrete]) / self.scale
+        if not np.isfinite(change).all():
+            raise SimulationError(
+                f"the motion has no derivative between t = {solution.t_start:.9g} and t = {solution.t_end:.9g}"
+            )
+        self.directions, triangle = np.linalg.qr(change)
+        return np.abs(np.diag(triangle))
 
 
 def largest_exponents(motion: Motion, start: Point, period: float) -> tuple[float, float]:
@@ -27,20 +83,7 @@ def largest_exponents(motion: Motion, start: Point, period: float) -> tuple[floa
     Exponential growth has the same rate in both halves, unlike growth by a power of time. The rates are -inf if
     stick reduces the change to zero.
     """
-    n, d = len(start.x), len(start.discrete)
-    change = np.ones(n + d) / math.sqrt(n + d)
-    parameters = np.zeros((len(motion.model.parameters), 1))
-    logarithms, point = [], start
-    for _ in range(_STRETCHES):
-        solution = motion.run(point, _PERIODS * period)
-        carried = Carrier(solution).carry(Directions(change[:n, None], change[n:, None], parameters))
-        change = np.concatenate([carried.x[:, 0], carried.discrete[:, 0]])
-        size = float(np.linalg.norm(change))
-        if size < _SMALLEST:
-            return -math.inf, -math.inf
-        logarithms.append(math.log(size))
-        change /= size
-        point = replace(point_at_end(solution), at=start.at)
-    half = _STRETCHES // 2
-    rates = [sum(part) / (half * _PERIODS * period) for part in (logarithms[:half], logarithms[half:])]
-    return rates[0], rates[1]
+    growth = Growth(motion, start, 1, np.ones(len(start.values)))
+    rates = [growth.over(_PERIODS * period)[0] / (_PERIODS * period) for _ in range(_PARTS)]
+    first, second = np.mean(np.reshape(rates, (2, -1)), axis=1)
+    return float(first), float(second)
