@@ -11,6 +11,7 @@ from numba import njit
 from scipy import sparse
 
 import hybridsim as hs
+from hybridsim.analysis.structures.growth import grows
 from hybridsim.analysis.structures.settling import Settling
 from hybridsim.errors import UsageError
 
@@ -63,7 +64,7 @@ def stepped(n: int, omega: float, limit: Any, steps: int, periods: int) -> Any:
 @pytest.mark.parametrize("omega", [0.6, 1.0, 1.5, 2.0, 2.6])
 def test_a_chain_of_fifty_agrees_with_a_time_stepper(omega: float) -> None:
     """The amplitudes are those that refined steps from rest end with."""
-    steady = hs.steady_state(chain(50, omega))
+    steady = hs.steady_state(chain(50, omega), max_periods=1500)
     assert steady.kind == "periodic"
     found = np.array([steady.amplitude[f"q{i + 1}"] for i in range(50)])
     expected = stepped(50, omega, limits(50), 32000, 150)
@@ -102,6 +103,61 @@ def test_the_response_of_one_block_is_that_of_den_hartog() -> None:
         u = math.sin(math.pi / r) / (r * (1.0 + math.cos(math.pi / r)))
         assert steady.stops_per_period["f"] == 0.0
         assert steady.amplitude["q1"] == pytest.approx(math.sqrt(v * v - (mu * u) ** 2), rel=1e-9)
+
+
+@pytest.mark.parametrize("mu", [0.1, 0.2])
+def test_one_block_at_half_its_frequency_approaches_a_motion_without_stops(mu: float) -> None:
+    """The block stops for a shorter time in each period; in Den Hartog's limit the amplitude is 1 / (1 - r^2)."""
+    contact = hs.MechanicalContact("f", [1.0], 1.0, "coulomb", {"mu": mu})
+    system = hs.MechanicalSystem([1.0], None, [1.0], [hs.Harmonic(0.5, sin=1.0)], [contact])
+    steady = hs.steady_state(system)
+    assert steady.kind == "periodic"
+    assert steady.amplitude["q1"] == pytest.approx(4.0 / 3.0, rel=1e-8)
+    assert steady.stick_fraction["f"] <= 1e-3
+
+
+@pytest.mark.parametrize("unit", [1.0, 1e-9, 1e9])
+@pytest.mark.parametrize("direction", [{0: -1.0, 1: 1.0}, {1: 1.0}])
+def test_a_structure_that_only_creeps_by_rounding_rests(direction: dict[int, float], unit: float) -> None:
+    """Both contacts hold 20 times the largest force, so that nothing moves."""
+    system = hs.MechanicalSystem(
+        [1.0, 2.0],
+        [[0.1, -0.02], [-0.02, 0.08]],
+        [[3.0, -1.0], [-1.0, 2.0]],
+        [hs.Harmonic(1.3, sin=2.0 * unit, cos=0.3 * unit), 0.2 * unit],
+        [
+            hs.MechanicalContact("f1", {0: 1.0}, 100.0 * unit, "coulomb", {"mu": 0.4}),
+            hs.MechanicalContact("f2", direction, 100.0 * unit, "coulomb", {"mu": 0.4}),
+        ],
+    )
+    steady = hs.steady_state(system, max_periods=200)
+    assert (steady.kind, steady.stick_fraction["f1"], steady.stick_fraction["f2"]) == (
+        "equilibrium",
+        1.0,
+        1.0,
+    )
+    assert steady.amplitude["q2"] <= 1e-12 * unit
+
+
+@pytest.mark.parametrize("factor", [1.0, 1e-6, 1e6])
+def test_the_unit_of_a_coordinate_has_no_effect(factor: float) -> None:
+    """The second of two blocks is measured in another unit of length: M, C, K and forces change with it."""
+    d = np.diag([1.0, 1.0 / factor])
+    system = hs.MechanicalSystem(
+        d @ np.diag([1.0, 2.0]) @ d,
+        d @ np.array([[0.1, -0.02], [-0.02, 0.08]]) @ d,
+        d @ np.array([[3.0, -1.0], [-1.0, 2.0]]) @ d,
+        [hs.Harmonic(1.3, sin=2.0), hs.Harmonic(1.3, cos=0.5 / factor)],
+        [
+            hs.MechanicalContact("f1", {0: 1.0}, 1.0, "coulomb", {"mu": 0.4}),
+            hs.MechanicalContact("f2", {0: -1.0, 1: 1.0 / factor}, 1.0, "coulomb", {"mu": 0.3}),
+        ],
+    )
+    steady = hs.steady_state(system)
+    other = hs.steady_state(system.to_model())
+    assert steady.kind == "periodic"
+    assert steady.amplitude["q1"] == pytest.approx(other.amplitude["q1"], rel=1e-8)
+    assert steady.amplitude["q2"] == pytest.approx(other.amplitude["q2"], rel=1e-8)
 
 
 def test_a_structure_without_contacts_has_the_linear_response() -> None:
@@ -197,12 +253,20 @@ def test_a_motion_that_drifts_is_not_settled() -> None:
         steady.amplitude["q1"]
 
 
+def test_a_motion_that_only_settles_slowly_does_not_drift() -> None:
+    """With hardly any damping the states still change after a few periods, but return to where they were."""
+    system = hs.MechanicalSystem([1.0], [1e-5], [1.0], [hs.Harmonic(0.5, sin=1.0)])
+    steady = hs.steady_state(system, max_periods=32, x0=[1.0, 0.0])
+    assert steady.kind == "not settled" and "drifts" not in steady.message
+
+
 class _Logistic:
     """A map x -> r x (1 - x) in the place of a `PeriodMap`, beside a decaying velocity."""
 
-    def __init__(self, r: float) -> None:
+    def __init__(self, r: float, x: float = 0.3) -> None:
         self.r, self.periods, self.period = r, 0, 1.0
-        self.x, self.modes, self.changes = np.array([0.3, 1.0]), np.zeros(0, dtype=np.int64), b"same"
+        self.x, self.modes, self.changes = np.array([x, 1.0]), np.zeros(0, dtype=np.int64), b"same"
+        self.natural, self.masses, self.slips = np.ones(2), np.ones(1), dict[tuple[int, int], int]()
 
     def snapshot(self) -> tuple[np.ndarray, ...]:
         return (self.x.copy(),)
@@ -223,8 +287,29 @@ class _Logistic:
         return np.array([0.5, 0.5]), np.array([1.0, 1.0])
 
 
-@pytest.mark.parametrize(("r", "multiple"), [(2.9, 1), (3.2, 2), (3.5, 4)])
+@pytest.mark.parametrize(("r", "multiple"), [(2.9, 1), (2.999, 1), (3.01, 2), (3.2, 2), (3.5, 4)])
 def test_extrapolation_does_not_end_on_a_motion_that_repels(r: float, multiple: int) -> None:
-    """The fixed point 1 - 1/r of the logistic map repels for r > 3, where a cycle of 2, then 4 periods attracts."""
-    settled = Settling(_Logistic(r), 1e-10, 8, 4096).run(None)  # type: ignore[arg-type]  # has the same methods
-    assert settled.multiple == multiple
+    """The fixed point 1 - 1/r of the logistic map repels for r > 3, where a cycle of 2, then 4 periods attracts.
+
+    Its multiplier is 2 - r.
+    """
+    for x in (0.3, 1.0 - 1.0 / r + 1e-4):
+        settled = Settling(_Logistic(r, x), 1e-10, 8, 4096).run(None)  # type: ignore[arg-type]  # has the methods
+        assert settled.multiple == multiple
+
+
+@pytest.mark.parametrize(
+    ("growth", "expected"), [(1.003, True), (-1.001, True), (1.0, False), (0.999, False)]
+)
+def test_growth_near_one_is_told_from_a_neutral_direction(growth: float, expected: bool) -> None:
+    """The states are multiplied by `growth` and by 0.9, which hides slow growth in the first periods."""
+
+    class Linear(_Logistic):
+        def advance(self) -> np.ndarray:
+            self.x = np.array([growth, 0.9]) * self.x
+            return self.x
+
+    linear: Any = Linear(0.0)
+    linear.x = np.zeros(2)
+    assert grows(linear, np.zeros(2), np.ones(2), 1, np.array([0.3, 1.0])) is expected
+    assert (linear.x == 0.0).all() is not expected

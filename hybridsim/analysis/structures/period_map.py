@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from hybridsim.analysis.structures.scales import FLOOR, masses_of, natural_sizes
 from hybridsim.engine.system.period import common_multiple
 from hybridsim.errors import SimulationError, UsageError
 from hybridsim.mechanics.codes import DONE
@@ -47,13 +48,16 @@ class PeriodMap:
     """The map of the states (2n,) at the beginning of a period to those at its end, at phase zero of the forcing.
 
     States are in the order of the arrays of `MechanicalRun`: positions, then velocities. The modes of the
-    contacts are carried from period to period.
+    contacts are carried from period to period. natural, masses: see `natural_sizes` and `masses_of`.
     """
 
     def __init__(self, system: MechanicalSystem, period: float, x: np.ndarray, rtol: float) -> None:
         self.system, self.period, self.periods = system, period, 0
-        span = (0.0, period)
-        self._run = MechanicalRun(build(system), span, x, rtol, _ABSOLUTE * rtol * _sizes(x), math.inf, False)
+        built = build(system)
+        self.masses = masses_of(system, built)
+        self.natural = natural_sizes(system, built, period)
+        self._run = MechanicalRun(built, (0.0, period), x, rtol, np.zeros(len(x)), math.inf, False)
+        self._set_tolerances(np.abs(self.x))
         self._run.begin()
         self._require_done()
 
@@ -78,6 +82,14 @@ class PeriodMap:
         """The changes of mode of each contact over the last period, and the modes at its end, to be compared."""
         events = np.concatenate([*self._run.events, np.zeros((0, 4), dtype=np.int64)])[:, :3]
         return events[np.argsort(events[:, 0], kind="stable")].tobytes() + self.modes.tobytes()
+
+    @property
+    def slips(self) -> dict[tuple[int, int], int]:
+        """How often each contact began to slip in each direction over the last period."""
+        events = np.concatenate([*self._run.events, np.zeros((0, 4), dtype=np.int64)])
+        begun = events[events[:, 2] != 0][:, [0, 2]]
+        found, counts = np.unique(begun, axis=0, return_counts=True)
+        return dict(zip(map(tuple, found.tolist()), counts.tolist(), strict=True))
 
     def snapshot(self) -> tuple[np.ndarray, ...]:
         """Return a copy of the states and modes, for `restore`."""
@@ -109,7 +121,7 @@ class PeriodMap:
         segments = NodeSegments(self._run.built.arrays, self._run.segments)
         states = segments.states(np.linspace(0.0, self.period, _SAMPLES + 1), True)
         largest = np.abs(states).max(axis=0)
-        self._run.state.tolerance[:] = (_ABSOLUTE * self._run.rtol * _sizes(largest)).reshape(2, -1)
+        self._set_tolerances(largest)
         return 0.5 * np.ptp(states, axis=0), largest
 
     def recorded(self, periods: int, offset: float) -> SeriesTrajectory:
@@ -119,6 +131,12 @@ class PeriodMap:
         self._run.is_recorded = True
         self._carry_out((offset, offset + periods * self.period))
         return SeriesTrajectory(self.system, self._run, None, "all", (0.0, 0.0))
+
+    def _set_tolerances(self, largest: np.ndarray) -> None:
+        """Choose the absolute tolerances by the largest sizes (2n,) of the states, or else by natural ones."""
+        sizes = np.maximum(largest, FLOOR * self.natural)
+        sizes[sizes == 0.0] = 1.0
+        self._run.state.tolerance[:] = (_ABSOLUTE * self._run.rtol * sizes).reshape(2, -1)
 
     def _carry_out(self, span: tuple[float, float]) -> None:
         self._run.restart(span)
@@ -132,8 +150,3 @@ class PeriodMap:
             raise SimulationError(
                 f"the run towards the steady state ended early ({ended.status}): {ended.message}"
             )
-
-
-def _sizes(x: np.ndarray) -> np.ndarray:
-    """Return the sizes of states, or 1 for a state that is zero."""
-    return np.where(x == 0.0, 1.0, np.abs(x))

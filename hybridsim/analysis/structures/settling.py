@@ -1,9 +1,15 @@
 """This module follows a forced mechanical system until its states repeat from period to period.
 
 A run of plain periods is followed as long as the states change. If the sequence of events is the same in
-consecutive periods, the period map is smooth there, and the states are extrapolated to their limit. The motion
-has settled if plain periods approach a limit within the tolerance. If it was extrapolated, a change of the
-states in their slowest direction must not grow, because extrapolation also finds motions that repel.
+consecutive periods, the period map is smooth there, and the states are extrapolated to their limit. The
+extrapolation counts only if the following plain periods change the states less than those before it.
+
+A contact that slips less in each period, until its force only just reaches the limit, approaches its place like
+1/k after k periods. There the change falls with the square of the distance, and the extrapolation has to go
+twice as far in the direction of the change.
+
+The motion has settled if plain periods approach a limit within the tolerance, or if their change is within the
+tolerance and no extrapolation reduces it. If the motion was extrapolated, `growth` decides whether it attracts.
 """
 
 from __future__ import annotations
@@ -16,20 +22,19 @@ import numpy as np
 from hybridsim.analysis.steady.motion import Point
 from hybridsim.analysis.steady.settling import Passings, relative
 from hybridsim.analysis.structures.extrapolation import limit_of
+from hybridsim.analysis.structures.growth import grows
 from hybridsim.analysis.structures.period_map import PeriodMap
+from hybridsim.analysis.structures.scales import FLOOR, with_floor
 
-_FLOOR = 1e-3  # smallest scale of a position or a velocity, relative to the largest scale of its kind
 _EVERY = 4  # periods between tests
 _COUNTS = (4, 8, 16, 32, 64, 128)  # periods in an extrapolation
-_BEYOND = (
-    0.9  # the same if the change falls with the square of the distance, as of a contact that hardly slips
-)
-_FEWEST = 3  # periods for an extrapolation
+_FEWEST, _ENOUGH = 3, 16  # periods for an extrapolation, and to say that none would help
 _GAIN = 0.1  # expected ratio of changes that makes an extrapolation worthwhile
 _FARTHEST = 1e3  # of the scale: a limit further away is that of a state that drifts
+_NEAR = 0.1  # the same if the events differ after the extrapolation
 _CLOSER = 0.5  # an extrapolation that does not reduce the change by this factor is taken back
-_CHANGE = 1e-6  # of the scale: the change of the states that must not grow
-_DECAY, _GROWN = 8, 1.1  # periods of this test, and the growth that is allowed, as of a neutral direction
+_SQUARED = (0.1, 0.5)  # reduction of the change by an extrapolation that covers about half of the distance
+_TWICE = 0.9  # additional length of the next extrapolation, which must not go beyond the limit
 _NEARLY = 1e4  # multiple of the tolerance: below it, the motion may be about to repeat
 _RESTS = 1e-12  # a smaller range relative to the size is rest
 
@@ -51,6 +56,24 @@ class Settled(NamedTuple):
     extrapolations: int
 
 
+class _Trial(NamedTuple):
+    """What was before an extrapolation, and whether it is short; fresh: pairs since the extrapolation before it."""
+
+    former: tuple[np.ndarray, ...]
+    states: list[np.ndarray]
+    pairs: list[tuple[np.ndarray, np.ndarray]]
+    fresh: int
+    slips: dict[tuple[int, ...], int]
+    events: bytes
+    is_near: bool
+
+    @property
+    def change(self) -> np.ndarray:
+        """The last change of the states over a period."""
+        before, after = self.pairs[-1]
+        return after - before
+
+
 class Settling:
     """Follows a motion until it repeats; see the module."""
 
@@ -58,12 +81,15 @@ class Settling:
         self.map, self.tol, self.settle, self.max_periods = period_map, tol, settle, max_periods
         self.extrapolations = 0
         self._may_extrapolate = True
-        self._beyond = 0.0  # length of the next extrapolation beyond the limit
+        self._trial: _Trial | None = None
+        self._is_squared = False  # whether the change falls with the square of the distance
+        self._beyond = 0.0  # additional length of the next extrapolation
+        self._wait = self._waited = 0  # periods until the next extrapolation, and since the last one
+        self._is_exhausted = False  # whether the last extrapolation did not help
         self._slowest = np.zeros(0)  # change over a period before the last extrapolation
         self._states = [period_map.x]  # at consecutive periods since the last extrapolation
-        self._pairs: list[
-            tuple[np.ndarray, np.ndarray]
-        ] = []  # states before and after periods with equal events
+        self._pairs: list[tuple[np.ndarray, np.ndarray]] = []  # around periods with equal events
+        self._fresh = 0  # pairs since the last extrapolation
         self._events = b""  # changes of mode over these periods
 
     def run(self, progress: Callable[[float], None] | None) -> Settled:
@@ -78,8 +104,10 @@ class Settling:
                 continue
             since = 0
             passings, rests = self._passings()
+            if not self._end_trial(passings.scale):
+                continue
             multiple = self._multiple(passings)
-            if rests or (multiple is not None and self._attracts(passings)):
+            if rests or (multiple is not None and self._attracts(passings, multiple)):
                 return Settled(passings, multiple, rests, self.extrapolations)
             if self.map.periods >= self.max_periods:
                 return Settled(passings, None, False, self.extrapolations)
@@ -89,6 +117,8 @@ class Settling:
     def _multiple(self, passings: Passings) -> int | None:
         """Return after how many periods the motion repeats, or None; a motion that nearly repeats earlier waits."""
         found = passings.repeats_after(self.tol)
+        if found is None and self._is_exhausted and passings.residual(1) <= self.tol:
+            return 1
         shorter = (m for m in range(1, found or 0) if passings.residual(m) <= _NEARLY * self.tol)
         return found if next(shorter, None) is None else None
 
@@ -97,59 +127,80 @@ class Settling:
         before = self.map.x
         found = step()
         self._states.append(self.map.x)
+        self._waited += 1
         if self.map.changes != self._events:
-            self._pairs, self._events = [], self.map.changes
+            self._pairs, self._fresh, self._events = [], 0, self.map.changes
         self._pairs = [*self._pairs[-_COUNTS[-1] :], (before, self.map.x)]
+        self._fresh += 1
         return found
 
     def _passings(self) -> tuple[Passings, bool]:
         """Return the passages of phase zero so far, and whether the motion has come to rest."""
         half, largest = self._follow(self.map.sizes)
-        scale = np.maximum(half, _FLOOR * largest)
-        for kind in np.split(np.arange(len(scale)), 2):
-            scale[kind] = np.maximum(scale[kind], _FLOOR * scale[kind].max())
+        largest = np.maximum(largest, self.map.natural)
+        scale = with_floor(np.maximum(half, FLOOR * largest), self.map.masses)
         last = Point(self.map.x, np.zeros(0), {}, self.map.modes)
         times = self.map.period * np.arange(len(self._states))
         return Passings(times, np.array(self._states), scale, last), bool((half <= _RESTS * largest).all())
 
     def _extrapolate(self, scale: np.ndarray) -> None:
-        """Put the limit of the periods with equal events in place of the states, if the motion returns better."""
-        if not self._may_extrapolate or len(self._pairs) < _FEWEST:
+        """Put the limit of the periods with equal events in place of the states."""
+        pairs = self._pairs[-self._fresh :] if self._is_squared else self._pairs
+        if not self._may_extrapolate or len(pairs) < _FEWEST or self._waited < self._wait:
             return
-        before, after = (np.array(part) for part in zip(*self._pairs, strict=True))
-        change = relative(after[-1] - before[-1], scale)
+        before, after = (np.array(part) for part in zip(*pairs, strict=True))
+        last = after[-1] - before[-1]
+        change = relative(last, scale)
         for count in _COUNTS:  # the latest periods show the map where the states are now
             limit, expected = limit_of(before[-count:], after[-count:], scale)
             if expected < _GAIN * change or count >= len(before):
                 break
         if not (expected < _GAIN * change and relative(limit - after[-1], scale) < _FARTHEST):
+            self._is_exhausted = len(pairs) >= _ENOUGH
+            self._wait, self._waited = max(_EVERY, len(pairs) // 2), 0
             return
-        former, events, states = self.map.snapshot(), self._events, self._states
-        limit += self._beyond * (limit - after[-1])
+        if self._beyond:
+            limit += self._beyond * _along(last, limit - after[-1], scale)
+        is_near = relative(limit - after[-1], scale) <= _NEAR
+        self._trial = _Trial(
+            self.map.snapshot(), self._states, self._pairs, self._fresh, self.map.slips, self._events, is_near
+        )
         self.map.put(limit)
-        self._states = [limit]
-        self._follow(self.map.advance)
-        left = relative(self.map.x - limit, scale) / change
-        if self._events != events or not left < _CLOSER:
-            self.map.restore(former)
-            self._states, self._beyond = states, 0.0
-            return
-        self.extrapolations += 1
-        self._slowest = after[-1] - before[-1]
-        self._beyond = _BEYOND if left > _GAIN else 0.0
+        self._states, self._fresh = [limit], 0
 
-    def _attracts(self, passings: Passings) -> bool:
+    def _end_trial(self, scale: np.ndarray) -> bool:
+        """Return False and take back the last extrapolation if the periods after it do not change the states less."""
+        trial, self._trial = self._trial, None
+        if trial is None:
+            return True
+        ratio = relative(self._states[-1] - self._states[-2], scale) / relative(trial.change, scale)
+        is_lost = any(self.map.slips.get(slip, 0) < count for slip, count in trial.slips.items())
+        if ratio < _CLOSER and (self._events == trial.events or (trial.is_near and not is_lost)):
+            self.extrapolations += 1
+            self._slowest, self._wait, self._is_exhausted = trial.change, 0, False
+            self._is_squared = _SQUARED[0] < ratio < _SQUARED[1]
+            self._beyond = _TWICE if self._is_squared else 0.0
+            return True
+        self.map.restore(trial.former)
+        self._states, self._pairs, self._fresh = trial.states, trial.pairs, trial.fresh
+        self._events = trial.events
+        self._beyond, self._is_exhausted = 0.0, True
+        self._wait, self._waited = max(_EVERY, self._fresh // 2), 0
+        return False
+
+    def _attracts(self, passings: Passings, multiple: int) -> bool:
         """Return whether a change in the slowest direction does not grow; if it does, go on from the changed states."""
         if not (self.extrapolations and self._may_extrapolate):
             return True
-        start, scale = self.map.snapshot(), passings.scale
-        x = self.map.x
-        by = _CHANGE * self._slowest / relative(self._slowest, scale)
-        self.map.put(x + by)
-        for _ in range(_DECAY):
-            y = self.map.advance()
-        if relative(y - x, scale) <= _GROWN * _CHANGE:
-            self.map.restore(start)
+        change = passings.values[-1] - passings.values[-1 - multiple]
+        if not grows(self.map, change, passings.scale, multiple, self._slowest):
             return True
-        self._may_extrapolate, self._states = False, [y]
+        self._may_extrapolate, self._states = False, [self.map.x]
         return False
+
+
+def _along(direction: np.ndarray, vector: np.ndarray, scale: np.ndarray) -> np.ndarray:
+    """Return the component of a vector (2n,) in a direction, in units of the scale of each state."""
+    used = np.where(scale > 0.0, scale, np.inf)
+    unit = direction / used
+    return direction * float(unit @ (vector / used)) / float(unit @ unit)

@@ -10,6 +10,7 @@ import numpy as np
 from hybridsim import arguments
 from hybridsim.analysis.steady.period_argument import require_multiple
 from hybridsim.analysis.steady.quiet import middle_of_longest
+from hybridsim.analysis.steady.settling import Passings
 from hybridsim.analysis.steady.together import Effort
 from hybridsim.analysis.structures.period_map import PeriodMap, forcing_period_of
 from hybridsim.analysis.structures.result import StructureSteadyState
@@ -67,7 +68,7 @@ def _result(period_map: PeriodMap, settled: Settled) -> StructureSteadyState:
         message = (
             f"not settled after {followed} periods: over the last one the states change by {residual:.1e}"
         )
-        drifting = passings.drifting()
+        drifting = _drifting(passings)
         if drifting is not None:
             message += f", and {period_map.state_names[drifting]} drifts"
     run = period_map.recorded(multiple, 0.0)
@@ -77,6 +78,14 @@ def _result(period_map: PeriodMap, settled: Settled) -> StructureSteadyState:
     if len(times) and not inside.all():
         run = period_map.recorded(multiple, middle_of_longest(np.sort(times % length), length))
     return StructureSteadyState(run, kind, multiple, residual, followed, message)
+
+
+def _drifting(passings: Passings) -> int | None:
+    """Return the index of a state that has left its range by equal changes, or None; slow settling is no drift."""
+    i = passings.drifting()
+    if i is None:
+        return None
+    return i if abs(passings.values[-1, i] - passings.values[0, i]) > passings.scale[i] else None
 
 
 def _refuse(system: MechanicalSystem, integrator: str, options: Mapping[str, Any]) -> None:

@@ -1,0 +1,47 @@
+"""This module decides whether a small change of a periodic motion grows from period to period."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hybridsim.analysis.steady.settling import relative
+from hybridsim.analysis.structures.period_map import PeriodMap
+
+_CHANGE = 1e-6  # of the scale: the change of the states
+_ROUND = 4  # repetitions after which the growth is measured
+_MOST = 32  # rounds
+_CLEAR = 0.1  # distance from one of a growth that needs few digits
+_EQUAL = (0.02, 5e-5)  # difference of two growths that have converged, clearly away from one and near one
+_GONE = 1e-3  # smallest change that matters, relative to the first one
+_NEUTRAL = 2e-4  # growth per repetition that is allowed, as of a direction in which a contact sticks anywhere
+
+
+def grows(
+    period_map: PeriodMap, drift: np.ndarray, scale: np.ndarray, multiple: int, direction: np.ndarray
+) -> bool:
+    """Return whether a change (2n,) in a direction grows over repetitions of a motion; if not, restore the map.
+
+    drift: the change of the states over one repetition, which is not zero exactly.
+
+    After some repetitions the change is in the direction that shrinks least or grows fastest. Its growth over a
+    repetition then converges to the size of the largest multiplier. The motion is followed until the growth has
+    converged, or the change is gone. If the change grows, the map goes on from the changed states.
+    """
+    start, x = period_map.snapshot(), period_map.x
+    period_map.put(x + _CHANGE * direction / relative(direction, scale))
+    used = scale > 0.0
+    size, growth, y = _CHANGE, np.inf, x
+    for k in range(_MOST):
+        for _ in range(_ROUND * multiple):
+            y = period_map.advance()
+        former, earlier = size, growth
+        left = y - x - (k + 1) * _ROUND * drift
+        size = float(np.linalg.norm(left[used] / scale[used]))
+        growth = (size / former) ** (1.0 / _ROUND) if size > 0.0 else 0.0
+        is_clear = abs(growth - 1.0) > _CLEAR
+        if size <= _GONE * _CHANGE or (k > 0 and abs(growth - earlier) < _EQUAL[0 if is_clear else 1]):
+            break
+    if growth > 1.0 + _NEUTRAL:
+        return True
+    period_map.restore(start)
+    return False
