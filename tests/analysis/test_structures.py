@@ -160,27 +160,6 @@ def test_a_structure_that_only_creeps_by_rounding_rests(direction: dict[int, flo
     assert steady.amplitude["q2"] <= 1e-12 * unit
 
 
-@pytest.mark.parametrize("factor", [1e-9, 1e9])
-def test_the_unit_of_a_coordinate_has_no_effect(factor: float) -> None:
-    """The second of two blocks is measured in another unit of length: M, C, K and forces change with it."""
-    d = np.diag([1.0, 1.0 / factor])
-    system = hs.MechanicalSystem(
-        d @ np.diag([1.0, 2.0]) @ d,
-        d @ np.array([[0.1, -0.02], [-0.02, 0.08]]) @ d,
-        d @ np.array([[3.0, -1.0], [-1.0, 2.0]]) @ d,
-        [hs.Harmonic(1.3, sin=2.0), hs.Harmonic(1.3, cos=0.5 / factor)],
-        [
-            hs.MechanicalContact("f1", {0: 1.0}, 1.0, "coulomb", {"mu": 0.4}),
-            hs.MechanicalContact("f2", {0: -1.0, 1: 1.0 / factor}, 1.0, "coulomb", {"mu": 0.3}),
-        ],
-    )
-    steady = hs.steady_state(system)
-    other = hs.steady_state(system.to_model())
-    assert steady.kind == "periodic"
-    assert steady.amplitude["q1"] == pytest.approx(other.amplitude["q1"], rel=1e-8)
-    assert steady.amplitude["q2"] == pytest.approx(other.amplitude["q2"], rel=1e-8)
-
-
 def test_a_structure_without_contacts_has_the_linear_response() -> None:
     """The amplitude is that of the complex stiffness; the period is common to both forces."""
     M, C, K = np.diag([1.0, 2.0]), np.array([[0.2, -0.1], [-0.1, 0.3]]), np.array([[3.0, -1.0], [-1.0, 2.0]])

@@ -63,7 +63,7 @@ class _Trial(NamedTuple):
     states: list[np.ndarray]
     pairs: list[tuple[np.ndarray, np.ndarray]]
     fresh: int
-    slips: dict[tuple[int, ...], int]
+    slips: dict[tuple[int, int], int]
     events: bytes
     is_near: bool
 
