@@ -150,12 +150,13 @@ def claim_figure_12(runs: dict[str, Response], study: StepStudy) -> Claim:
     near = abs(ours[closest]["A_D"] - 0.15) <= 0.02
     verdict = Verdict.ARTEFACT if shrinks else Verdict.REPRODUCED if near else Verdict.SHAPE
     chatter = max(runs[v.name].jumps for v in paper.SIGNS)
-    numbers = " and ".join(f"{100 * row[first]:.2g} % to {100 * row[-1]:.2g} %" for row in falls.values())
+    by_step, by_stage = (f"from {100 * row[first]:.2g} % to {100 * row[-1]:.2g} %" for row in falls.values())
     why = (
         f"Without stick the force jumps between its limits, up to {chatter:.0f} times per period. The exact motion "
         f"sticks for {100 * runs[EXACT].stick:.0f} % of the period. The closest reading ({paper.described(closest)}) "
-        f"has A_D = {100 * ours[closest]['A_D']:.1f} %. The deviation from the exact motion decreases from "
-        f"{numbers} (sign by step, by stage) as h0 increases from {paper.STEPS_PER_PERIOD} to {STEPS[-1]}."
+        f"has A_D = {100 * ours[closest]['A_D']:.1f} %. If h0 increases from {paper.STEPS_PER_PERIOD} to "
+        f"{STEPS[-1]}, the deviation from the exact motion decreases. It decreases {by_step} with sign by step, "
+        f"and {by_stage} with sign by stage."
     )
     return Claim(
         "figure 12",

@@ -64,10 +64,10 @@ class StepStudy:
         """Return the result of the step study as a sentence."""
         first = STEPS.index(STEPS_PER_PERIOD)
         values = [self.along(v.name, quantity) for v in SIGNS]
-        parts = " and ".join(f"from {100 * a[first]:.2g} % to {100 * a[-1]:.2g} %" for a in values)
+        by_step, by_stage = (f"from {100 * a[first]:.2g} % to {100 * a[-1]:.2g} %" for a in values)
         return (
-            f"Along the ridge the deviation from the exact motion (sign by step and by stage) decreases {parts} as "
-            f"h0 increases from {STEPS_PER_PERIOD} to {STEPS[-1]}."
+            f"If h0 increases from {STEPS_PER_PERIOD} to {STEPS[-1]}, the deviation from the exact motion "
+            f"along the ridge decreases. It decreases {by_step} with sign by step, and {by_stage} with sign by stage."
         )
 
     def to_plain(self, quantity: str) -> dict[str, Any]:
