@@ -213,7 +213,8 @@ over N. For each load the script finds the largest amplitude over the frequency.
   P - pi F0)). The smallest amplitude is **A = pi F0/k_d** = {
         1e3 * math.pi * blade.force / blade.kd:.4f} mm at **N =
   pi F0/(2 mu)** = {loads[formula]:.2f} N, with the stiffness k_b + k_d/2. With the damping c (line in the
-  picture) the smallest amplitude is {1e3 * harmonic[formula]:.4f} mm. The sweep gives {
+  picture) the smallest amplitude is {
+        1e3 * harmonic[formula]:.4f} mm. In the sweep the smallest amplitude is {
         1e3 * peaks[formula]:.4f} mm. Below N = pi F0/(4 mu) = {
         loads[formula] / 2:.1f} N friction alone cannot limit the
   resonance. Over all loads the amplitude of the first harmonic differs from the sweep by up to {

@@ -167,7 +167,7 @@ speed. The script `python docs/studies/brake.py` finds the onset in three ways:
   if c is small enough. At the onset lambda = i sqrt(2).
 - **Linearization.** `hs.linearize` in the mode `slip-` gives the coefficient at which its `growth` is zero.
 - **Simulation.** The run starts {SHAKE:g} away from steady sliding, and lasts {WATCHED:g} units of time without an
-  event. A matrix maps the states to the states {STEP:g} later. It is fitted to the run (dynamic mode
+  event. A matrix maps the states at one time to the states {STEP:g} later. It is fitted to the run (dynamic mode
   decomposition, Schmid 2010, [doi:10.1017/S0022112010001217](https://doi.org/10.1017/S0022112010001217)). The largest
   eigenvalue of the matrix gives the growth.
 

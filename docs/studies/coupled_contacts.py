@@ -109,8 +109,8 @@ If static and kinetic friction are equal, the motion is unique. Nevertheless the
 combinations. It uses only two derivatives, or none for redundant sets of contacts, and treats values below 1e-9 as
 zero. With static friction above kinetic friction, several outcomes may be
 possible. The run begins with stick in all contacts that may stick, and then releases the contacts whose force
-exceeds the limit. The orders of declaration lead to different results because of rounding. These differences grow
-because neighbouring motions move apart.
+exceeds the limit. Different orders of declaration can lead to different results because of rounding. These
+differences grow because neighbouring motions move apart.
 
 ## Work and energy
 

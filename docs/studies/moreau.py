@@ -260,7 +260,7 @@ largest impulse. Times are on one core of a machine that also ran other programs
 | --- | --- | --- | --- | --- | --- |
 {works}
 
-With theta = 1/2 the sum of all works in a step equals the gain of kinetic and elastic energy. The missing energy in
+If theta = 1/2, the sum of all works in a step equals the gain of kinetic and elastic energy. The missing energy in
 the table is rounding. Friction and impacts do not add energy, because the sums of their works are negative. A
 contact becomes active in the first step in which its gap would close by the middle of the step. A gap may therefore
 become negative, by at most 1 - e/2 times the distance of a step. No gap in this study is below this limit.

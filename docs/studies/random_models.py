@@ -146,8 +146,8 @@ Are the errors of runs as small as the tolerance requests? Of {runs} runs of ran
 allowed error.
 
 `python docs/studies/random_models.py` makes 200 random structures, and runs each with {draws} draws of parameters
-and initial values. It compares every run with a reference at four times. These are the end of the run and three
-times between steps, which test the dense output.
+and initial values. It compares every run with a reference at four times. Three of these times are between steps, as
+a test of the dense output, and the fourth is the end of the run.
 
 - There are 100 dense linear systems x' = A x + f phi(t) of one to eight states. In some systems the matrix A is
   generic, or oscillatory with about ten turns. In others A is defective. Its chains of equal eigenvalues are
