@@ -82,7 +82,7 @@ forces (constant, sines, square waves). It also has up to three kinds of compone
 
 The numbers of each structure are drawn {draws} times, and each set of numbers is called a draw. The draws are run
 in turns by `dop853` (rtol 1e-9), `taylor` (1e-10) and, if possible, `exact`. Each run is also compared with a run
-by the next of these integrators.
+of the same draw by the next of these integrators.
 
 The *other method* is time stepping without location of events (`tests/reference/stepped_structures.py`). The forces
 of a step satisfy the laws at the end of the step. The method is of first order. It runs with 2003, 4327 and 8923
@@ -92,9 +92,10 @@ compared with those of a run of hybridsim at 100 times. For any two successive r
 difference is extrapolated to the finest step. Let d be the largest extrapolated difference. If the method is of
 order one, d equals its error. The verdicts are defined as follows:
 
-- A run *agrees* if it differs by at most 3 d at all times. In addition d must be below 0.5 % of the motion, or
-  below 2 % in runs with the most steps. The run by the other integrator must end with the same status. The
-  difference of the two runs by hybridsim must not be larger than the effect of a change of the start by 1e-6.
+- A run *agrees* if it differs from the other method by at most 3 d at all times. In addition d must be below 0.5 %
+  of the motion, or below 2 % in runs with the most steps. The run by the other integrator must end with the same
+  status. The difference of the two runs by hybridsim must not be larger than the effect of a change of the start by
+  1e-6.
 - A run is *sensitive* from the time on at which the other method depends too strongly on the start. After this time, a
   change of the start by 1e-5 changes the result of the other method by more than 3e-3. The causes are grazing
   impacts, stops that barely happen, and chaos. The run must agree up to this time.

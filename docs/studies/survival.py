@@ -216,8 +216,8 @@ def entries(journal: Path) -> int:
 
 TEXT = """# Runs that are stopped, sweeps that are killed
 
-Does a run or a sweep survive an interruption? {verdict} A resumed sweep gives the results of an uninterrupted sweep,
-and computes at most {most} point per kill again. `docs/studies/survival.py` interrupts runs and sweeps.
+Does a run or a sweep survive an interruption? {verdict} A resumed sweep gives the results of an uninterrupted sweep.
+After each kill it computes at most {most} point a second time. `docs/studies/survival.py` interrupts runs and sweeps.
 
 ## Stopped at a random step and resumed
 

@@ -137,7 +137,7 @@ def page(
             "",
             "## Other points",
             "",
-            f"The motions of the other points are: {kinds}.",
+            f"Of the other points these motions were found: {kinds}.",
             "",
             "| points | status |",
             "| --- | --- |",

@@ -165,7 +165,7 @@ def claim(found: Maps, quantity: str, study: StepStudy) -> Claim:
     end = best["above 10 %"] or {"F0/N": math.nan, "r": math.nan}
     truly = readings[pair_name((closest.split("; ")[0], EXACT))]
     why = (
-        f"Our map has such a ridge. The closest reading ({described(closest)}) has "
+        f"Our map also has a ridge of large values. The closest reading ({described(closest)}) has "
         f"{_percent(best['maximum'])} at F0/N = {best['at'][0]:g}, r = {best['at'][1]:g}. It stays above 10 "
         f"% up to F0/N = {end['F0/N']:g}, r = {end['r']:g}. {study.sentence(quantity)} Near the threshold "
         f"(F0/N = {found.ratios[0]:g}, median over r) it is {_percent(best['near the threshold'])} in this "
