@@ -42,7 +42,8 @@ def machine() -> str:
         except PackageNotFoundError:
             continue
     today = datetime.date.today().isoformat()
-    return f"{_processor()}, Python {platform.python_version()}, {', '.join(versions)}, on {today}."
+    with_ = f"{_processor()}, Python {platform.python_version()}, {', '.join(versions)}"
+    return f"The runs were made on {today} with {with_}."
 
 
 def _processor() -> str:
