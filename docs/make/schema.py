@@ -106,7 +106,7 @@ CSV = said("a CSV beside the model", TEXT)
 POINTS = table(
     {
         "at": NUMBERS, "file": CSV, "columns": {"type": "array"},
-        "values": said("one number, or with `across` one row, for each number in `at`", {"type": "array"}),
+        "values": said("one value, or with `across` one row, for each number in `at`", {"type": "array"}),
         "over": said("the argument; the speed v if not given", TEXT),
         "interpolation": {"enum": ["cubic", "linear"]},
         "across": said("the second argument of a table of two", TEXT), "across_at": NUMBERS,

@@ -92,7 +92,8 @@ def slip_force(contact: Contact, speed: float, *, backward: bool = False) -> flo
         table.name: [evaluate(e, values) for e in (table.over, table.across) if e is not None]
         for table in law.tables
     }
-    values |= {table.name: table.value(*arguments[table.name]) for table in law.tables}
+    known = {name: parse(value) for name, value in values.items()}
+    values |= {table.name: table.bound(known).value(*arguments[table.name]) for table in law.tables}
     return evaluate((law.slip_backward if backward else None) or law.slip, values)
 
 

@@ -47,7 +47,7 @@ def check_law(scope: Scope, law: FrictionLaw) -> None:
             allowed = parameters | at_rest | {NORMAL}
         elif field.startswith("slip"):
             allowed = parameters | {table.name for table in law.tables} | {SPEED, NORMAL}
-        elif field.endswith(", start"):
+        elif field.endswith((", start", ", values")):
             allowed = parameters
         elif field.startswith("table "):
             allowed = parameters | {SPEED}

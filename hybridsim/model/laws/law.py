@@ -135,6 +135,8 @@ class FrictionLaw(Declared):
             yield f"table {table.name}, over", table.over
             if table.across is not None:
                 yield f"table {table.name}, across", table.across
+            for value in table.expressions():
+                yield f"table {table.name}, values", value
         for state in self.states:
             yield f"state {state.name}, start", state.start
             yield f"state {state.name}, der", state.der

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from importlib import import_module
 from itertools import pairwise
 from typing import Any
 
 from hybridsim.errors import Place, UsageError
-from hybridsim.expr import Expression, parse, substitute
+from hybridsim.expr import Expression, evaluate, parse, substitute
 from hybridsim.model.laws.point_interpolation import CUBIC, LINEAR, texts, texts_of_names, value
 from hybridsim.model.parts.component import Choice, Corner, Guard, Mode
-from hybridsim.model.parts.declared import Declared
+from hybridsim.model.parts.declared import Declared, as_tuple
 
 _SPEED = parse("v")
 INTERPOLATIONS = (CUBIC, LINEAR)
@@ -39,8 +39,9 @@ class LawTable(Declared):
         Name of the function in the law's expressions.
     at : sequence of float
         Arguments (k,), increasing.
-    values : sequence of float
-        Values (k,) at the arguments, or (k, m) for a table of two arguments.
+    values : sequence of float or str
+        Values (k,) at the arguments, or (k, m) for a table of two arguments. With one argument and linear
+        interpolation they may be expressions of the parameters of the law. `fit` then finds these parameters.
     over : str or float, optional
         The argument, an expression of the names of the law; the default is the speed v.
     interpolation : str, optional
@@ -81,10 +82,12 @@ class LawTable(Declared):
             raise self._fault(f"`interpolation` cannot be {self.interpolation!r}", remedy)
         self._numbers("at", "across_at")
         self._expressions("over", "across")
-        if self.across is None:
-            self._numbers("values")
-        else:
+        if self.across is not None:
             self._grid()
+        elif any(isinstance(entry, str | Expression) for entry in as_tuple(self.values)):
+            self._parse_values()
+        else:
+            self._numbers("values")
         if len(self.at) != len(self.values):
             raise self._fault(
                 f"`at` has {len(self.at)} numbers, but `values` has {len(self.values)}",
@@ -103,6 +106,29 @@ class LawTable(Declared):
                     f"`{field}` is not ascending: {second:g} follows {first:g}",
                     f"use ascending numbers in `{field}`",
                 )
+
+    def _parse_values(self) -> None:
+        """Parse the values of a table of one argument, which may contain expressions."""
+        parsed = [self._parsed(entry, "values", functions=False) for entry in as_tuple(self.values)]
+        if self.interpolation != LINEAR:
+            text = next((e.text for e in parsed if e.names), None)
+            if text is not None:
+                raise self._fault(
+                    f"`values` contains {text}, but cubic interpolation needs numbers",
+                    'set interpolation="linear"',
+                )
+        object.__setattr__(self, "values", tuple(e if e.names else evaluate(e, {}) for e in parsed))
+
+    def bound(self, values: Mapping[str, Expression]) -> LawTable:
+        """Return the table with expressions in place of the parameters of the law."""
+        if not any(isinstance(entry, Expression) for entry in self.values):
+            return self
+        found = [substitute(e, values) if isinstance(e, Expression) else e for e in self.values]
+        return replace(self, values=tuple(found))
+
+    def expressions(self) -> Iterator[Expression]:
+        """Yield the values that are expressions."""
+        yield from (entry for entry in self.values if isinstance(entry, Expression))
 
     def _grid(self) -> None:
         """Convert the values of a table of two arguments to rows of floats, and check them."""
@@ -159,6 +185,11 @@ class LawTable(Declared):
 
     def value(self, argument: float, across: float | None = None) -> float:
         """Return the value of the function at one argument, or at both arguments of a table of two."""
+        for entry in self.expressions():
+            raise UsageError(
+                f"table {self.name} has the value {entry.text}, which depends on parameters",
+                remedy="use a table whose values are numbers",
+            )
         values = self.values
         if self.across is not None:
             if across is None:
@@ -172,15 +203,17 @@ class LawTable(Declared):
     def expression_at(self, argument: float, name: str) -> Expression:
         """Return the value at a number of the first argument.
 
-        name: the variable of the table. A table of two arguments gives an expression of the variables of its rows.
+        name: the variable of the table. A table of two arguments gives an expression of the variables of its rows,
+        and a table with parameters an expression of them.
         """
-        if self.across is None:
+        named = self._named(name)
+        if not named:
             return parse(self.value(argument))
         count, terms = len(self.at), []
-        for k, row in enumerate(self.row_names(name)):
+        for k, row in enumerate(named):
             share = value(self.at, [float(i == k) for i in range(count)], LINEAR, argument)
             terms += [f"{share!r}*{row}"] * (share != 0.0)
-        return parse(" + ".join(terms))
+        return substitute(parse(" + ".join(terms)), named)
 
     def arguments(self) -> list[frozenset[str]]:
         """Return the names in each argument."""
@@ -195,6 +228,14 @@ class LawTable(Declared):
     def row_names(self, name: str) -> list[str]:
         """Return the variables with the values at each number in `at`, for a table of two arguments."""
         return [f"{name}_{k}" for k in range(1, len(self.at) + 1)] if self.across is not None else []
+
+    def _named(self, name: str) -> dict[str, Expression]:
+        """Return the values at each number in `at` by names, unless all of them are numbers."""
+        if self.across is not None:
+            return {row: parse(row) for row in self.row_names(name)}
+        if not any(self.expressions()):
+            return {}
+        return {f"value_{k}": parse(entry) for k, entry in enumerate(self.values, 1)}
 
     def components(
         self, name: str, argument: Expression, across: Expression | None, from_zero: bool
@@ -212,25 +253,35 @@ class LawTable(Declared):
                 row: texts(self.across_at, values, LINEAR)
                 for row, values in zip(rows, self.values, strict=True)
             }
-            yield _automaton(f"{name}_across", found, self.across_at, across, self.place)
-        own = texts_of_names(self.at, rows) if rows else texts(self.at, self.values, self.interpolation)
+            yield _automaton(f"{name}_across", found, self.across_at, {"a": across}, self.place)
+        named = self._named(name)
+        own = (
+            texts_of_names(self.at, list(named)) if named else texts(self.at, self.values, self.interpolation)
+        )
         skipped = 1 if from_zero and self.at[0] <= 0.0 else 0
-        yield _automaton(name, {name: own[skipped:]}, self.at, argument, self.place)
+        yield _automaton(name, {name: own[skipped:]}, self.at, {"a": argument, **named}, self.place)
 
 
 def _automaton(
-    name: str, pieces: dict[str, list[str]], at: Sequence[float], argument: Expression, place: Place | None
+    name: str,
+    pieces: dict[str, list[str]],
+    at: Sequence[float],
+    parts: Mapping[str, Expression],
+    place: Place | None,
 ) -> Corner:
-    """Return the automaton that sets variables to piecewise functions of the argument `a`, with one mode per piece."""
+    """Return the automaton that sets variables to piecewise functions, with one mode per piece.
+
+    parts : the argument `a`, and expressions for other names in the pieces.
+    """
     count = len(next(iter(pieces.values())))
     ends, modes = at[len(at) + 1 - count :], []
     for k in range(count):
         guards = []
         if k:
-            guards.append(_guard("left", f"a - ({ends[k - 1]!r})", argument, str(k)))
+            guards.append(_guard("left", f"a - ({ends[k - 1]!r})", parts["a"], str(k)))
         if k < len(ends):
-            guards.append(_guard("right", f"{ends[k]!r} - a", argument, str(k + 2)))
-        values = {of: substitute(parse(own[k]), {"a": argument}) for of, own in pieces.items()}
+            guards.append(_guard("right", f"{ends[k]!r} - a", parts["a"], str(k + 2)))
+        values = {of: substitute(parse(own[k]), parts) for of, own in pieces.items()}
         modes.append(Mode(str(k + 1), tuple(guards), set=values))
     return Corner(name, tuple(modes), initial="1", place=place)
 

@@ -146,7 +146,7 @@ class Contact(Declared):
             argument = substitute(table.over, names)
             across = None if table.across is None else substitute(table.across, names)
             from_zero = table.over.text == SPEED and self.law.is_set_valued
-            yield from table.components(self.variable(table.name), argument, across, from_zero)
+            yield from table.bound(values).components(self.variable(table.name), argument, across, from_zero)
 
     def variable(self, name: str) -> str:
         """Return the name that a state, table or load of the friction law has in the model."""
@@ -221,11 +221,15 @@ class Contact(Declared):
 
     def slip_force_at(self, speed: float, backward: bool = False) -> Expression:
         """Return the magnitude of the slip force at a numeric speed."""
-        tables = [t for t in self.law.tables if t.over.text == SPEED]
-        names = {t.name: t.expression_at(speed, self.variable(t.name)) for t in tables}
         slip = (self.law.slip_backward if backward else None) or self.law.slip
         assert slip is not None  # always set in a set-valued law
-        return substitute(self._form("slip", slip=slip), {SPEED: parse(speed), **self.values(), **names})
+        names = {SPEED: parse(speed), **self.values()} | self._tables_at(speed, self.values())
+        return substitute(self._form("slip", slip=slip), names)
+
+    def _tables_at(self, speed: float, values: Mapping[str, Expression]) -> dict[str, Expression]:
+        """Return the value of each table of the speed at a numeric speed."""
+        tables = [table.bound(values) for table in self.law.tables if table.over.text == SPEED]
+        return {table.name: table.expression_at(speed, self.variable(table.name)) for table in tables}
 
     def limit_force(self, backward: bool = False) -> Expression:
         """Return the largest force in stick, in the names of the model."""
@@ -237,9 +241,7 @@ class Contact(Declared):
         assert force is not None
         if which not in self._forces:
             names |= self.values()
-            for table in self.law.tables:
-                if table.over.text == SPEED:
-                    names[table.name] = table.expression_at(0.0, self.variable(table.name))
+            names |= self._tables_at(0.0, names)
             self._forces[which] = substitute(self._form("force", force=force), names)
         return self._forces[which]
 

@@ -174,7 +174,7 @@ def _tables(law: Table, folder: Path) -> Iterator[LawTable]:
             for key in _POINTS:
                 table.require(key, f"write {key} = [0, ...]")
             numbers = {"at": table.numbers("at")}
-            numbers["values"] = table.numbers("values") if across is None else table.rows("values")
+            numbers["values"] = table.values("values") if across is None else table.rows("values")
         over = table.expression("over") or parse(SPEED)
         way = table.text("interpolation", "cubic")
         try:

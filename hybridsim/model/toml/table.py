@@ -107,6 +107,13 @@ class Table:
             return ()
         return tuple(_real(value) for value in found)
 
+    def values(self, key: str) -> tuple[Any, ...]:
+        """Return a list of numbers and expressions; without expressions it is read as by `numbers`."""
+        found = self._typed(key, list, "a list of numbers", [])
+        if not any(isinstance(value, str) for value in found):
+            return self.numbers(key)
+        return tuple(self.parsed(value, key, index) for index, value in enumerate(found))
+
     def rows(self, key: str) -> tuple[tuple[float, ...], ...]:
         """Return a list of lists of numbers; a wrong list is reported and returned as empty."""
         found = self._typed(key, list, "a list of lists of numbers", [])
