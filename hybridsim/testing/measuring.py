@@ -89,7 +89,7 @@ def run(
         params=dict(scene.params),
         x0=dict(scene.start),
         integrator=integrator,
-        progress=ProcessorTime(processor_seconds),
+        progress=None if processor_seconds == inf else ProcessorTime(processor_seconds),
         **{**scene.options, **settings},
     )
 
