@@ -6,6 +6,7 @@ import gc
 import math
 from collections.abc import Iterator
 from importlib import import_module
+from itertools import count
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -15,15 +16,27 @@ settings.register_profile("noisy", deadline=None, suppress_health_check=[HealthC
 if settings.get_current_profile_name() == "default":
     settings.load_profile("noisy")
 
+MODULES = (
+    100  # a collection of everything after so many modules of tests, for objects that were not permanent
+)
+_MODULES = count(1)
+
 
 def pytest_collection_finish() -> None:
-    """Exempt the collected tests and the libraries from garbage collections, and collect less often.
+    """Collect garbage less often: by default it would take a sixth of the processor time, as in `hybridsim.cli`."""
+    gc.set_threshold(50_000, 20, 20)
 
-    These objects are permanent, and collections that scanned them would take a sixth of the processor time.
+
+@pytest.fixture(scope="module", autouse=True)
+def frozen_objects() -> None:
+    """Exempt what former tests left behind from collections, since most of it is permanent.
+
+    A full collection of these libraries, tests and compiled kernels would take seconds.
     """
+    if next(_MODULES) % MODULES == 0:
+        gc.unfreeze()
     gc.collect()
     gc.freeze()
-    gc.set_threshold(50_000, 20, 20)
 
 
 @pytest.fixture(scope="session", autouse=True)

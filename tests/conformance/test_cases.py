@@ -27,10 +27,16 @@ NATIVE = [name for name in INTEGRATORS if name.startswith("scipy-")]
 QUICK = "scipy-dop853"
 TURNS = [name for name in NATIVE if name != QUICK]
 MULTISTEP = [name for name in INTEGRATORS if name.startswith("cvode-")]
+MANY_PERIODS = 60  # units of time; the events repeat, and each of the other methods takes ten seconds or more
 
 
 def has_its_turn(name: str, number: int) -> bool:
-    """Whether the scene of that number is for this method; `QUICK` has every second one, and the others the rest."""
+    """Whether the scene of that number is for this method.
+
+    `QUICK` has every second scene and those of many periods. The other methods of the libraries have the rest.
+    """
+    if name in (*NATIVE, *MULTISTEP) and MANY_PERIODS < length(SCENES[number]) < ENDLESS:
+        return name == QUICK
     if name in MULTISTEP:
         return number // 2 % len(MULTISTEP) == MULTISTEP.index(name)
     if name in TURNS:
@@ -39,11 +45,17 @@ def has_its_turn(name: str, number: int) -> bool:
 
 
 LONGEST = 400  # units of time
+ENDLESS = 1e6  # units of time; an event ends a run with a longer horizon
+
+
+def length(scene: Scene) -> float:
+    """Return the length of a scene in units of time."""
+    return abs(scene.span[1] - scene.span[0]) / scene.unit
 
 
 def is_long(scene: Scene) -> bool:
-    """Whether a scene is for compiled methods alone; an endless horizon, which an event ends, is not long."""
-    return LONGEST < abs(scene.span[1] - scene.span[0]) / scene.unit < 1e6
+    """Whether a scene is for compiled methods alone."""
+    return LONGEST < length(scene) < ENDLESS
 
 
 def runs() -> list[Any]:

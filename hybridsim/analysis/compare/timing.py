@@ -26,7 +26,8 @@ def timed_in_turns(
 
     Each run must have been called once; short ones are called several more times before the first round.
     Garbage collection is off, as in `timeit`, because it would disturb random runs. Objects alive at the
-    start are frozen, so that collections between the runs are cheap.
+    start are frozen, so that collections between the runs are cheap. If the caller has frozen objects, nothing
+    else is frozen, because no function of Python could unfreeze it alone.
 
     Parameters
     ----------
@@ -37,9 +38,10 @@ def timed_in_turns(
     """
     times: list[list[float]] = [[] for _ in runs]
     likely = [0.0] * len(runs) if expected is None else list(expected)
-    collecting = gc.isenabled()
+    collecting, freezes = gc.isenabled(), gc.get_freeze_count() == 0
     gc.collect()
-    gc.freeze()
+    if freezes:
+        gc.freeze()
     try:
         if expected is not None:
             likely = [_warmed_up(run, seconds, until) for run, seconds in zip(runs, expected, strict=True)]
@@ -61,7 +63,8 @@ def timed_in_turns(
                     run()
                     times[i].append(time.perf_counter() - start)
     finally:
-        gc.unfreeze()
+        if freezes:
+            gc.unfreeze()
         if collecting:
             gc.enable()
     return [tuple(spent) for spent in times]

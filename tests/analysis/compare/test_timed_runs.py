@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -108,6 +109,21 @@ def test_a_round_that_is_too_long_is_shortened_by_its_longest_runs() -> None:
     calls.clear()
     timed_in_turns(runs, 2, expected=[1.0, 50.0, 2.0], until=time.monotonic() - 1.0)
     assert calls == []
+
+
+def test_objects_that_the_caller_froze_stay_frozen() -> None:
+    gc.freeze()
+    frozen = gc.get_freeze_count()
+    timed_in_turns([lambda: None], 1)
+    assert gc.get_freeze_count() > 0.9 * frozen
+
+
+def test_objects_that_were_frozen_for_the_timing_are_collected_later() -> None:
+    gc.unfreeze()
+    counts: list[int] = []
+    timed_in_turns([lambda: counts.append(gc.get_freeze_count())], 1)
+    assert counts[0] > 0 and gc.get_freeze_count() == 0
+    gc.freeze()  # as in all modules of tests
 
 
 def test_a_budget_runs_out(monkeypatch: pytest.MonkeyPatch) -> None:

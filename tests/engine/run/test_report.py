@@ -29,6 +29,16 @@ def beads(count: int) -> hs.Model:
     return hs.Model(name, states=states, contacts=contacts)
 
 
+def seconds_to_compile(model: hs.Model) -> float:
+    """Compile all functions of a model, and return the processor time of this thread."""
+    code = compiled(model)
+    names = functions_in(code.module.__loader__.get_source(code.module.__name__))
+    start = time.thread_time()
+    for name in names:
+        code.address(name)
+    return time.thread_time() - start
+
+
 def test_the_estimate_is_of_the_size_of_the_measured_time() -> None:
     model = beads(4)
     before = describe(model)
@@ -36,10 +46,9 @@ def test_the_estimate_is_of_the_size_of_the_measured_time() -> None:
     text = "\n".join(lines_of(model, before, (), ()))
     assert f"({before.operations} operations, generated in {before.lowering_seconds:.1g} s)" in text
     assert f"compiled at the first run, in about {before.compile_seconds:.1g} s or less" in text
-    code, start = compiled(model), time.process_time()
-    for name in functions_in(code.module.__loader__.get_source(code.module.__name__)):
-        code.address(name)
-    measured = time.process_time() - start
+    measured = min(
+        seconds_to_compile(model), seconds_to_compile(beads(4))
+    )  # other programs may slow down one
     assert before.compile_seconds / 5.0 < measured < 5.0 * before.compile_seconds
     after = describe(model)
     assert after.compile_seconds == 0.0

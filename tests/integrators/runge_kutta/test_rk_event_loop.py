@@ -29,6 +29,14 @@ PERIOD = 2 * math.pi / hs.load("dfcs").parameter_values()["omega"]
 APART = ("twisting", "long-swing", "touch-beside-a-sample")
 SAME_TO_ROUNDING = [s for s in SCENES if "stiff" not in s.needs and s.name not in APART]
 WEIGHTS = bernstein_weights(4)
+PERIODS, ENDLESS = 20.0, 1e6  # units of time: what is compared of a long scene, and what only an event ends
+
+
+def compared(scene: Scene) -> tuple[float, float]:
+    """The first periods of a scene: later events repeat them, and conformance tests judge the whole scene."""
+    first, last = scene.span
+    is_cut = PERIODS < abs(last - first) / scene.unit < ENDLESS
+    return first, first + math.copysign(PERIODS * scene.unit, last - first) if is_cut else last
 
 
 def still(guard: str) -> hs.Model:
@@ -126,20 +134,21 @@ def test_the_compiled_loop_and_the_general_way(
 ) -> None:
     """The same events to the order, times and states to the tolerance."""
     settings = {"params": dict(scene.params), "x0": dict(scene.start), "rtol": 1e-10, **scene.options}
-    kernel_run = hs.simulate(load(scene), scene.span, integrator=method, **settings)
+    span = compared(scene)
+    kernel_run = hs.simulate(load(scene), span, integrator=method, **settings)
     with monkeypatch.context() as patch:
         patch.setattr(integrator_class(method), "has_compiled_loop", False)
-        stepped = hs.simulate(load(scene), scene.span, integrator=method, **settings)
+        stepped = hs.simulate(load(scene), span, integrator=method, **settings)
     assert kernel_run.status == stepped.status
     assert [(e.kind, e.component, e.guard, e.source, e.target) for e in kernel_run.events] == [
         (e.kind, e.component, e.guard, e.source, e.target) for e in stepped.events
     ]
     times = [[e.t for e in sol.events] for sol in (kernel_run, stepped)]
     assert times[0] == pytest.approx(times[1], rel=1e-8, abs=1e-8 * scene.unit)
-    grid = np.linspace(*sorted((scene.span[0], min(kernel_run.t_end, stepped.t_end))), 201)
+    grid = np.linspace(*sorted((span[0], min(kernel_run.t_end, stepped.t_end))), 201)
     # closer to an event than times are compared, an instant may be before it in one run and behind it in the other;
     # and the potential of `exponential-neuron` rises there by 2e10 per unit of time
-    near = 1e-8 * max(scene.unit, *map(abs, scene.span))
+    near = 1e-8 * max(scene.unit, *map(abs, span))
     grid = grid[[all(abs(t - at) > near for at in times[0]) for t in grid]]
     size = np.max(np.abs(stepped(grid)), axis=1, initial=0.0)[:, None]
     assert np.max(np.abs(kernel_run(grid) - stepped(grid)) / (size + 1e-300), initial=0.0) < 1e-6

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import json
 import time
 from pathlib import Path
@@ -365,13 +366,21 @@ def test_a_part_can_be_checked_alone_but_not_run(capfd: pytest.CaptureFixture[st
 
 
 def test_two_hundred_parts_load_in_proportion_to_twenty(tmp_path: Path) -> None:
-    """Ten times the parts take about ten times as long; a time in proportion to the square would be a hundred."""
-    seconds = {}
-    for count in (20, 20, 200):  # what is loaded or compiled once is not counted
-        chain = (EXAMPLES / "chain.toml").read_text().replace("20", str(count))
-        written(tmp_path, block=(EXAMPLES / "block.toml").read_text(), chain=chain)
-        began = time.process_time()
-        model = hs.load(tmp_path / "chain.toml")
-        seconds[count] = time.process_time() - began
-    assert seconds[200] < 30.0 * seconds[20]
+    """Ten times the parts take about ten times as long; a time in proportion to the square would be a hundred.
+
+    Each time is the shortest of some. It leaves out what is loaded or compiled once, collections of garbage and the
+    work of other threads.
+    """
+    seconds: dict[int, list[float]] = {20: [], 200: []}
+    gc.disable()
+    try:
+        for count in (20, 20, 20, 200, 200):
+            chain = (EXAMPLES / "chain.toml").read_text().replace("20", str(count))
+            written(tmp_path, block=(EXAMPLES / "block.toml").read_text(), chain=chain)
+            began = time.thread_time()
+            model = hs.load(tmp_path / "chain.toml")
+            seconds[count].append(time.thread_time() - began)
+    finally:
+        gc.enable()
+    assert min(seconds[200]) < 30.0 * min(seconds[20])
     assert len(model.contacts) == 200
