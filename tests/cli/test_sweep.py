@@ -6,7 +6,10 @@ import csv
 import json
 import math
 from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -39,6 +42,35 @@ def test_processes_give_the_bits_of_threads(hybridsim: Callable, tmp_path: Path)
     assert "ProcessPool" in (tmp_path / "processes" / "sweep.json").read_text(encoding="utf-8")
     code, _, err = hybridsim(*sweep, "--processes", 2, "--workers", 2)
     assert code == 2 and "--processes cannot be combined with --workers" in err
+
+
+class Breaking(ThreadPoolExecutor):
+    """A pool whose worker ends after the first batch, as a process that the system kills."""
+
+    batches = 0
+
+    def submit(self, *args: Any, **options: Any) -> Future[Any]:
+        self.batches += 1
+        if self.batches > 1:
+            raise BrokenProcessPool("a process was terminated")
+        return super().submit(*args, **options)
+
+
+def test_points_of_a_killed_process_run_again(
+    hybridsim: Callable, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The finished points stay in the journal, and the same command completes the table."""
+    argv = ("sweep", "dfcs", "F0=22:30:3", *FINAL, "--out", "o", "--processes", 1)
+    with monkeypatch.context() as patched:
+        patched.setattr("hybridsim.cli.commands.sweep._pool", lambda processes: Breaking(processes))
+        code, out, err = hybridsim(*argv)
+    assert code == 1
+    assert "1 of 3 points: ok" in out
+    assert "2 of 3 points: the executor lost the batch" in err and "same command runs the lost points" in err
+    assert (tmp_path / "o" / "sweep.journal").exists()
+    code, out, err = hybridsim(*argv)
+    assert code == 0 and "3 of 3 points: ok" in out and "continuing from" in err
+    assert not (tmp_path / "o" / "sweep.journal").exists()
 
 
 def test_readings_of_the_last_period(hybridsim: Callable) -> None:

@@ -104,7 +104,7 @@ def add_to(commands: Any) -> None:
 
 
 def execute(args: argparse.Namespace, session: Session) -> int:
-    """Run the sweep, print a table and write the results; the exit code is 1 if all points failed."""
+    """Run the sweep, print a table and write the results; the exit code is 1 if all points failed or some were lost."""
     model = values.changed_model(args)
     folder: Path = args.out or Path(f"sweep-{model.name}")
     require_folder(folder, "--out")
@@ -153,6 +153,8 @@ def _fill(
     is_new: bool,
 ) -> int:
     """Run the sweep and write its results to a folder, which is locked for other processes."""
+    from hybridsim.analysis.sweep.work.job import LOST
+
     journal = folder / "sweep.journal"
     if journal.exists():
         complain(f"continuing from {journal}")
@@ -174,9 +176,10 @@ def _fill(
         if is_new and not any(folder.iterdir()):
             folder.rmdir()
         raise
+    is_lost = any(text.startswith(LOST) for text, _ in result.problems())
     try:  # write files first: printing fails if the reader of the pipe has gone
         _write(result, args.over, folder, session)
-        if not result.interrupted:
+        if not (result.interrupted or is_lost):
             journal.unlink(missing_ok=True)
     finally:
         say(result.to_json() if args.json else result.table())
@@ -185,7 +188,11 @@ def _fill(
     if result.interrupted:
         complain(f"interrupted after {int((~result.failed).sum())} of {result.status.size} points")
         return session.interrupted_code
-    return SimulationError.exit_code if result.failed.all() else 0
+    if is_lost:
+        complain(
+            "a worker ended, for example for lack of memory: the same command runs the lost points again"
+        )
+    return SimulationError.exit_code if is_lost or result.failed.all() else 0
 
 
 def _pool(processes: int | None) -> AbstractContextManager[ProcessPoolExecutor | None]:

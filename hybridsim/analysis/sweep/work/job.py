@@ -14,6 +14,7 @@ from hybridsim.expr import Expression
 from hybridsim.model import Model
 
 DONE, NOT_RUN = "ok", "not run"
+LOST = "the executor lost the batch"  # how the status of a point begins whose worker has ended
 _MAX_JOBS = 4  # number of sweeps whose model a worker process keeps
 
 

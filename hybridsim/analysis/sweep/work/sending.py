@@ -12,7 +12,7 @@ from typing import Any, Protocol
 from hybridsim.analysis.sweep.collected import Collected
 from hybridsim.analysis.sweep.journal import Journal
 from hybridsim.analysis.sweep.work.batches import Batches
-from hybridsim.analysis.sweep.work.job import Batch, Job, Outcome, Settings, Watch, run_batch
+from hybridsim.analysis.sweep.work.job import LOST, Batch, Job, Outcome, Settings, Watch, run_batch
 from hybridsim.errors import UsageError
 
 # Batches in progress per worker: one being computed and one waiting. More would only need memory.
@@ -138,7 +138,7 @@ class Sending:
     def _refused(self, numbers: range, error: BaseException) -> None:
         """Record a batch that could not be run; errors of single points are handled by the workers."""
         require_sendable(self._job, error)
-        lost = Outcome(f"the executor lost the batch: {type(error).__name__}: {error}", None)
+        lost = Outcome(f"{LOST}: {type(error).__name__}: {error}", None)
         self._collected.put(numbers, [lost] * len(numbers))
 
 
