@@ -7,10 +7,10 @@ from typing import Any
 
 import hybridsim
 from hybridsim.cli import options, values
-from hybridsim.cli.commands.sweep import number_of, values_by_name
 from hybridsim.cli.output import complain, say
 from hybridsim.cli.progress import Progress
 from hybridsim.cli.session import Session
+from hybridsim.cli.swept_values import number_of, values_by_name
 from hybridsim.errors import UsageError
 from hybridsim.model import Model
 
