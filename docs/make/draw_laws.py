@@ -15,7 +15,8 @@ from matplotlib.figure import Figure
 
 import hybridsim as hs
 from hybridsim.model import list_laws
-from hybridsim.plot import friction_law, save, style
+from hybridsim.plot import friction_law, save
+from hybridsim.plot.shared import style
 
 FOLDER = Path(__file__).parents[2] / "docs" / "images" / "laws"
 
