@@ -10,6 +10,7 @@ import hybridsim
 
 sys.path.insert(0, str(Path(__file__).parent / "make"))
 import figures
+import picture_links
 
 project, author = "hybridsim", "The hybridsim developers"
 project_copyright = "The hybridsim developers"
@@ -60,9 +61,10 @@ html_theme_options = {
 
 
 def setup(app: Any) -> None:
-    """Say at the foot of each page with figures of which sources they are."""
+    """Say at the foot of each page with figures of which sources they are, and make pictures links."""
 
     def add(app: Any, name: str, source: list[str]) -> None:
         source[0] += figures.footer(f"{name}.md")
 
     app.connect("source-read", add)
+    app.connect("doctree-resolved", picture_links.add)

@@ -68,8 +68,13 @@ def main(names: list[str]) -> None:
 def small(axes: list[Axes]) -> Figure:
     """The picture of a law at the width at which a table shows it, with its title in shorter lines."""
     figure, title = style.figure_of(axes), axes[0].get_title(loc="left").replace("\n", " ")
-    figure.set_size_inches(0.5 + 2.3 * len(axes), 2.3)
-    width = 30 * len(axes)
+    figure.set_size_inches(2.8, 2.3 * len(axes))
+    grid = figure.add_gridspec(len(axes), 1)
+    for k, each in enumerate(axes):
+        each.set_subplotspec(grid[k])
+        each.tick_params(labelleft=True)
+        each.set_ylabel(axes[0].get_ylabel(), fontsize=9)
+    width = 30
     lines = title.split(", ", 1) if len(title) > width else [title]
     if max(map(len, lines)) > width:
         lines = textwrap.wrap(title, width)

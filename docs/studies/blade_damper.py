@@ -22,7 +22,7 @@ from hybridsim.plot.shared import style
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "studies" / "blade-damper.md"
 PICTURE = ROOT / "docs" / "images" / "blade-damper.png"
-FREQUENCIES = np.linspace(960.0, 1130.0, 52)  # rad/s, beyond both resonances, for the curves of response
+FREQUENCIES = np.linspace(960.0, 1130.0, 171)  # rad/s, beyond both resonances, for the curves of response
 BRACKET = 990.0, 1110.0  # rad/s, in which the highest point is looked for: the response has one
 LIGHTEST, HEAVIEST = 0.01, 1e4  # N
 SHOWN = (1.0, 50.0, 157.0, 1000.0, 10000.0)  # N, whose curves of response are drawn
@@ -80,15 +80,16 @@ class Blade:
 def picture(found: hs.Sweep, curves: hs.Sweep, blade: Blade) -> None:
     """Curves of response, the optimum, and the work."""
     loads = found.axes["N"]
-    figure = style.figure(11.0, 4.8)
+    figure = style.figure(style.BROAD, 4.8)
     left, right = figure.subfigures(1, 2, width_ratios=(1.0, 1.05))
     response = left.subplots()
     for i, load in enumerate(SHOWN):
         response.semilogy(
             FREQUENCIES, 1e3 * curves["amplitude.x"][i], color=style.PALETTE[i], label=f"N = {load:g} N"
         )
-    response.set(xlabel="frequency of the excitation / (rad/s)", ylabel="amplitude of x / mm")
-    response.legend(fontsize=8)
+    response.set(xlabel="frequency of the excitation [rad/s]", ylabel="amplitude of x [mm]")
+    response.yaxis.set_major_formatter("{x:g}")
+    response.legend(fontsize=9, ncols=2, loc="lower left", bbox_to_anchor=(0, 1), frameon=False, borderaxespad=0.2)
     upper, lower = right.subplots(2, 1, sharex=True)
     fine = np.geomspace(loads[0], loads[-1], 400)
     theory = [1e3 * blade.first_harmonic(load) for load in fine]
@@ -101,9 +102,9 @@ def picture(found: hs.Sweep, curves: hs.Sweep, blade: Blade) -> None:
         level = 1e3 * blade.linear_peak(stiffness)
         upper.axhline(level, color=style.INK, lw=0.9, ls=dash)
         offset, side = (3, "bottom") if text == "no damper" else (-3, "top")
-        upper.annotate(text, (at, level), (0, offset), textcoords="offset points", va=side, fontsize=8)
-    upper.set(ylabel="resonant amplitude / mm", ylim=(0.3, 14.0))
-    upper.legend(fontsize=8, loc="lower left")
+        upper.annotate(text, (at, level), (0, offset), textcoords="offset points", va=side, fontsize=9)
+    upper.set(ylabel="resonant\namplitude [mm]", ylim=(0.3, 14.0))
+    upper.legend(fontsize=9, loc="lower left", frameon=False)
     slipping = slips(found, blade)
     lower.loglog(
         loads[slipping],
@@ -114,8 +115,8 @@ def picture(found: hs.Sweep, curves: hs.Sweep, blade: Blade) -> None:
     lower.loglog(
         loads[slipping], found["work"][slipping], "o", ms=4, color=style.PALETTE[0], label="integrated"
     )
-    lower.set(xlabel="normal load N / N", ylabel="work of friction\nin a cycle / J")
-    lower.legend(fontsize=8, loc="lower center")
+    lower.set(xlabel="normal load N [N]", ylabel="work of friction\nper cycle [J]")
+    lower.legend(fontsize=9, loc="lower center", frameon=False)
     for axes in (response, upper, lower):
         style.dress(axes)
     style.save(figure, PICTURE)

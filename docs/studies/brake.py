@@ -94,7 +94,7 @@ def onsets(c: float) -> tuple[float, float, float]:
 
 def picture(growth: dict[float, np.ndarray], sizes: dict[float, np.ndarray]) -> None:
     """Growth and settled amplitude over the coefficient of friction."""
-    figure = style.figure(11.0, 4.2)
+    figure = style.figure(style.BROAD, 4.2)
     left, right = figure.subplots(1, 2)
     fine = np.linspace(FRICTION[0], FRICTION[-1], 601)
     for i, c in enumerate(DAMPING):
@@ -106,8 +106,8 @@ def picture(growth: dict[float, np.ndarray], sizes: dict[float, np.ndarray]) -> 
     left.plot([], [], "s", ms=7, mfc="none", color=style.GREY, label="linearize")
     left.plot([], [], ".", ms=5, color=style.INK, label="simulation")
     left.axhline(0.0, color=style.INK, lw=0.8)
-    left.set(xlabel="coefficient of friction mu", ylabel="growth of a small shake")
-    left.legend(fontsize=8, loc="upper left")
+    left.set(xlabel="coefficient of friction mu", ylabel="growth rate")
+    left.legend(fontsize=9, loc="lower left", bbox_to_anchor=(0, 1), ncols=3, frameon=False, borderaxespad=0.2)
     for shake, marker, colour in ((LARGE, "s", style.PALETTE[1]), (SHAKE, ".", style.PALETTE[0])):
         right.plot(
             FRICTION,
@@ -116,11 +116,11 @@ def picture(growth: dict[float, np.ndarray], sizes: dict[float, np.ndarray]) -> 
             ms=7,
             mfc="none",
             color=colour,
-            label=f"after a shake of {shake:g}",
+            label=f"x starts {shake:g} away",
         )
     right.axvline(threshold(SQUEALING), color=style.GREY, lw=0.9, ls=":", label="onset, closed form")
-    right.set(xlabel="coefficient of friction mu", ylabel=f"amplitude of x that is left, c = {SQUEALING:g}")
-    right.legend(fontsize=8, loc="upper left")
+    right.set(xlabel="coefficient of friction mu", ylabel=f"final amplitude of x, c = {SQUEALING:g}")
+    right.legend(fontsize=9, loc="lower left", bbox_to_anchor=(0, 1), ncols=2, frameon=False, borderaxespad=0.2)
     for axes in (left, right):
         style.dress(axes)
     style.save(figure, PICTURE)

@@ -148,21 +148,21 @@ def order_text(order: tuple[float, bool], letter: str = "e") -> str:
 
 def picture(found: dict[str, dict[str, np.ndarray]], every: list[Scene]) -> None:
     """A panel for each scene."""
-    figure = style.figure(12.0, 4.6)
+    figure = style.figure(style.BROAD, 4.2)
     panels = figure.subplots(1, len(every), sharey=True)
     for panel, scene in zip(panels, every):
         for law in LAWS:
             errors, colour = found[scene.name][law.name], COLOURS[law.name]
             panel.loglog(SMALL, errors, MARKERS[law.name], ms=5, color=colour, label=law.name)
             panel.loglog(SMALL[2:], theory(scene.expected(law), errors)[2:], "-", lw=1.0, color=colour)
-        panel.set_title(
-            f"{scene.name}: sticks {100 * scene.sticks:.0f} % of the time", fontsize=10, loc="left"
-        )
-        panel.set(xlabel="e = v0/max |v|, or (mu N/stiffness)/max |x|")
+        share = f": {100 * scene.sticks:.0f} % of the time in stick" if scene.sticks else ""
+        panel.set_title(f"{scene.name}{share}", fontsize=9, loc="left")
+        panel.set(xlabel="e")
         style.dress(panel)
     panels[0].set(ylabel="largest error of x / max |x|")
-    panels[0].plot([], [], "-", lw=1.0, color=style.INK, label="order of theory")
-    panels[0].legend(fontsize=8, loc="lower right")
+    panels[0].plot([], [], "-", lw=1.0, color=style.INK, label="order of theory, drawn for e up to 1e-2")
+    style.put_title(figure, "e is v0/max |v|, or (mu N/stiffness)/max |x|", size=10)
+    style.legend_below(figure, panels[0].get_legend_handles_labels()[0])
     style.save(figure, PICTURE)
 
 

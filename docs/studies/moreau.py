@@ -135,7 +135,7 @@ def energy(system: hs.MechanicalSystem, x: np.ndarray) -> float:
 
 def picture(groups: tuple[list[Found], list[Found]]) -> None:
     """Errors over the step, in units of the coarsest one, with the slope of first order."""
-    figure = style.figure(10.0, 7.2)
+    figure = style.figure(style.BROAD, 6.8)
     panels = figure.subplots(2, 2, sharex=True, sharey=True)
     for row, (found, title) in enumerate(zip(groups, ("dry friction", "impacts"), strict=True)):
         for column, (what, text) in enumerate(

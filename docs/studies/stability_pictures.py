@@ -28,24 +28,24 @@ def theory(panel: Axes, case: Case, method: Method, steps: np.ndarray) -> None:
     dashed = {"color": style.PALETTE[1], "lw": 1.8, "ls": "--"}
     dotted = {"color": "white", "lw": 1.8, "ls": ":"}
     if method is TANH:
-        panel.plot(steps, case.stable(steps), **dotted, label="RK4 stable above")
+        panel.plot(steps, case.stable(steps), **dotted, label="theory: RK4 is stable above")
         return
     if method.name == "kept" and not case.belt_speed:
-        panel.axhline(case.creep(), **dashed, label="creep is 1 % of x below")
+        panel.axhline(case.creep(), **dashed, label="theory: creep is 1 % of x")
     elif method.name == "zeroed" or not case.belt_speed:
-        panel.axhline(case.early_stop(), **dashed, label="early stops are 1 % of x below")
+        panel.axhline(case.early_stop(), **dashed, label="theory: error of early stops is 1 %")
     if method.law:
         return
-    panel.plot(steps, case.too_fast_for_16(steps), **dotted, label="16 halvings reach it above")
+    panel.plot(steps, case.too_fast_for_16(steps), **dotted, label="theory: above, 16 halvings suffice")
     if not case.belt_speed:
-        panel.axvline(case.late_release(), color=style.PALETTE[1], lw=1.4, ls="-.", label="late release: 1 %")
+        panel.axvline(case.late_release(), color=style.PALETTE[1], lw=1.4, ls="-.", label="theory: error of late releases is 1 %")
 
 
 def maps(case: Case, found: dict[str, Map], star: tuple[float, str], path: Path) -> None:
     """A panel for each method: error over (steps per period, width of the zone), its 1 % line, theory, the paper."""
-    figure = style.figure(12.0, 9.2)
+    figure = style.figure(style.BROAD, 8.2)
     panels = figure.subplots(2, 2)
-    mesh = None
+    mesh, named = None, {}
     for panel, method in zip(panels.ravel(), MAPPED):
         steps, zones, errors, excess = found[method.name]
         size = np.where(np.isfinite(errors), np.clip(np.abs(errors), LOW, HIGH), HIGH)
@@ -55,7 +55,7 @@ def maps(case: Case, found: dict[str, Map], star: tuple[float, str], path: Path)
         boundary(panel, steps, zones, size, "white", "black", 2.4)
         rows, columns = np.nonzero(~np.isfinite(excess) | (np.abs(excess) > (0.11 if case.belt_speed else 0)))
         panel.plot(
-            steps[columns], zones[rows], "x", color="#b00000", ms=4, mew=1.2, label="wrong number of stops"
+            steps[columns], zones[rows], "x", color="#b00000", ms=4, mew=1.2, clip_on=False, label="wrong number of stops"
         )
         panel.plot([], [], "-", color="black", lw=2.4, label="error 1 %")
         panel.set(xscale="log", yscale="log", xlim=(steps[0], steps[-1]), ylim=(zones[0], zones[-1]))
@@ -64,13 +64,11 @@ def maps(case: Case, found: dict[str, Map], star: tuple[float, str], path: Path)
         panel.set_title(method.title, fontsize=10, loc="left")
         panel.set(xlabel="steps per period, T/h", ylabel=f"{method.letter} / largest |v| (relative)")
         panel.tick_params(labelsize=9)
-        legend = panel.legend(
-            fontsize=8,
-            loc="lower left" if method is TANH else "lower right",
-            facecolor="#b8b8b8",
-            framealpha=0.9,
-        )
-        legend.set_zorder(5)
+        named.update({line.get_label(): line for line in panel.get_legend_handles_labels()[0]})
+    legend = figure.legend(
+        handles=list(named.values()), loc="outside lower center", ncols=2, fontsize=9, facecolor="#b8b8b8"
+    )
+    legend.get_frame().set_edgecolor("none")
     figure.colorbar(mesh, ax=panels, label="largest relative error of the amplitude of x", extend="both")
     style.save(figure, path)
 
@@ -95,9 +93,11 @@ def moves(
     groups: dict[str, list[tuple[Case, dict[str, Map]]]], methods: tuple[Method, ...], path: Path
 ) -> None:
     """The 1 % lines of several cases, a row for what varies, a column for each method; right is below and right."""
-    figure = style.figure(15.0, 8.2)
-    panels = figure.subplots(len(groups), len(methods), sharex=True, sharey=True)
-    for row, (says, cases) in zip(panels, groups.items()):
+    figure = style.figure(style.BROAD, 7.6)
+    style.put_title(figure, "Lines of 1 % error: right below and to the right. Star: T/1200 and 8e-4 m/s", size=10)
+    parts = figure.subfigures(len(groups), 1)
+    for part, (says, cases) in zip(parts, groups.items()):
+        row = part.subplots(1, len(methods), sharex=True, sharey=True)
         for panel, method in zip(row, methods):
             for k, (case, found) in enumerate(cases):
                 steps, zones, errors, _ = found[method.name]
@@ -129,23 +129,16 @@ def moves(
             panel.set_title(method.title, fontsize=10, loc="left")
             style.dress(panel)
         row[0].set(ylabel=f"{says} varied\nwidth of the zone / largest |v|")
-        # beside the panels: within them every corner has a line of some case
-        row[-1].legend(
-            fontsize=9,
-            title="star: T/1200 and 8e-4 m/s there",
-            title_fontsize=9,
-            loc="upper left",
-            bbox_to_anchor=(1.02, 1.0),
-            frameon=False,
-        )
-    for panel in panels[-1]:
-        panel.set(xlabel="steps per period, T/h")
+        for panel in row:
+            panel.set(xlabel="steps per period, T/h")
+        # below the panels: within them every corner has a line of some case
+        part.legend(handles=row[0].get_legend_handles_labels()[0], loc="outside lower center", ncols=2, fontsize=9, frameon=False)
     style.save(figure, path)
 
 
 def chatter(found: dict[str, tuple[np.ndarray, np.ndarray]], path: Path) -> None:
     """Error of rk4-sign over the step, the worst of its last fifty periods."""
-    figure = style.figure(8.0, 5.0)
+    figure = style.figure(style.WIDTH, 5.4)
     panel = figure.subplots()
     for k, (name, (steps, errors)) in enumerate(found.items()):
         size = np.where(np.isfinite(errors), np.abs(errors), np.nan)
@@ -162,8 +155,8 @@ def chatter(found: dict[str, tuple[np.ndarray, np.ndarray]], path: Path) -> None
     panel.axvline(PAPER_STEPS, color=style.GREY, lw=1.6, ls=":", label="T/1200")
     steps = np.array([300.0, 6000.0])
     panel.plot(steps, 40.0 / steps, "--", color=style.INK, lw=1.0, label="first order in the step")
-    panel.set(xlabel="steps per period, T/h", ylabel="relative error of the amplitude, worst of 50 periods")
-    panel.set_title("rk4-sign", fontsize=10, loc="left")
+    panel.set(xlabel="steps per period, T/h", ylabel="relative error of the amplitude")
+    panel.set_title("rk4-sign: worst of 50 periods", fontsize=10, loc="left")
     style.dress(panel)
-    panel.legend(fontsize=8, ncols=2)
+    figure.legend(handles=panel.get_legend_handles_labels()[0], loc="outside lower center", ncols=3, fontsize=9, frameon=False)
     style.save(figure, path)

@@ -79,3 +79,7 @@ def test_units_are_printed_and_variables_of_tables_are_not(tmp_path: Path, hybri
     assert next(row for row in rows if row[:2] == ["v", "[m/s]"])[-1] == "(m/s)^2*s"
     assert not {"f_v", "f_mu"} & {row[0] for row in rows}
     assert "f_mu" not in out
+    assert next(row for row in rows if "work" in row)[-2] == "work"  # the unit of this force is unknown
+    code, out, err = hybridsim("steady", "dfcs")
+    assert code == 0, err
+    assert next(row for row in map(str.split, out.splitlines()) if "work" in row)[-1] == "J"

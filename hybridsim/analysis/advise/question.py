@@ -18,7 +18,6 @@ from hybridsim.errors import HybridsimError, UsageError, near, nearest
 from hybridsim.model import Model, Output
 from hybridsim.model.checks.units import units_of
 from hybridsim.simulate import simulate
-from hybridsim.solution import Solution
 
 OF_QUANTITY = ("amplitude", "peak", "maximum", "minimum", "mean", "energy", "harmonic")
 OF_CONTACT = ("dissipated", "stick_fraction")
@@ -145,10 +144,9 @@ class Question:
         if is_run and head == "final":
             return float(motion.solution.output(name, motion.solution.t_end))
         if is_run and head == "dissipated":
-            span = motion.solution.t_end - motion.solution.t_start
-            return float(motion.mean[_power(name)]) * span
+            return motion.solution.integral(_power(name))
         if is_run and head == "stick_fraction":
-            return stuck(motion.solution, name)
+            return stuck(motion, name)
         return _of(getattr(motion, head, {}), name, head)
 
     def _call(self, motion: Any) -> Number:
@@ -184,10 +182,9 @@ def _require_limit_cycle(model: Model, steady: SteadyState) -> None:
         raise NoAnswer("the motion is undamped, so the amplitude depends on the initial state")
 
 
-def stuck(solution: Solution, contact: str) -> float:
-    """Return the fraction of a run that a contact spends in stick, or 0 if the contact has no stick mode."""
-    spent = sum(i.t1 - i.t0 for i in solution.modes.get(contact, ()) if i.mode == _STICK)
-    return float(spent / (solution.t_end - solution.t_start))
+def stuck(motion: Measures, contact: str) -> float:
+    """Return the fraction of a motion that a contact spends in stick, or 0 if the contact has no stick mode."""
+    return motion.mode_fraction.get(f"{contact}.{_STICK}", 0.0)
 
 
 def _of(values: Any, name: str, head: str) -> float:
@@ -236,7 +233,7 @@ def speeds(model: Model, motion: Measures) -> tuple[dict[str, float], float]:
     """Return the mean speed of each contact while it slides, and the largest speed of all contacts."""
     means, peak = {}, 0.0
     for contact in model.contacts:
-        sliding = 1.0 - stuck(motion.solution, contact.name)
+        sliding = 1.0 - stuck(motion, contact.name)
         means[contact.name] = motion.mean[_speed(contact.name)] / sliding if sliding > 0.0 else 0.0
         peak = max(peak, motion.peak[_velocity(contact.name)])
     return means, peak

@@ -44,7 +44,7 @@ class Linearization(Readable):
     admissible : bool
         Whether the modes can hold there: all their guards are >= 0.
     warnings : tuple of str
-        Reasons to doubt the result, such as a normal load that is 0 at the time of the linearization.
+        Reasons to doubt the result, such as a normal load that is 0, or small, at the time of the linearization.
 
     Examples
     --------

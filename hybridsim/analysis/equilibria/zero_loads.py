@@ -1,37 +1,67 @@
-"""This module warns of normal loads that are zero at the time of a linearization, and change with time."""
+"""This module warns of normal loads that are zero or small at the time of a linearization, and change with time."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 
 from hybridsim.engine.system.instant import Instant
+from hybridsim.engine.system.period import common_period
 from hybridsim.engine.system.signals import Signal
 from hybridsim.engine.system.system import System
 from hybridsim.expr.grammar import TIME
 from hybridsim.model.meanings import Meanings
+from hybridsim.model.parts.contact import Contact
 from hybridsim.model.smoothing.one_sided import number_of
+
+_SMALL = 1e-3  # relative to the largest load: below it, the friction of the contact hardly affects the result
+_SAMPLES = 256  # of a period, for its largest load
 
 
 def zero_loads(system: System, t: float, x: np.ndarray) -> tuple[str, ...]:
-    """Return a warning for each contact whose load is zero at time t and states x, and depends on time.
+    """Return a warning for each contact whose load depends on time, and is zero or small at time t and states x.
 
-    A load is left out if it depends on a variable that the modes of a component set.
+    A load is small relative to the largest one over a period of the forcing and at the times of tables, with the same
+    states. A load is left out if it depends on a variable that the modes of a component set.
     """
     model = system.written
     meanings, inputs = Meanings(model), {declared.name for declared in model.inputs}
-    numbers = {**model.parameter_values(), **model.discrete_values(), TIME: t}
-    numbers |= dict(zip(system.names, x.tolist(), strict=True))
-    for declared, signal in zip(system.model.inputs, system.signals, strict=True):
-        numbers[declared.name] = _value(signal, t)
-    return tuple(
-        f"the normal load of {contact.name} is 0 at t = {t:g}, at which the model is linearized, and it changes with "
-        "time: give the model its final load as a constant"
-        for contact in model.contacts
-        if meanings.depended_on(contact.normal.names) & {TIME, *inputs}
-        and number_of(contact.normal.tree, numbers, meanings.lookup) == 0.0
-    )
+    states = dict(zip(system.names, x.tolist(), strict=True))
+    numbers = {**model.parameter_values(), **model.discrete_values(), **states}
+    found = []
+    for contact in model.contacts:
+        if not meanings.depended_on(contact.normal.names) & {TIME, *inputs}:
+            continue
+        load = _load(contact, system, meanings, numbers, t)
+        if load is None:
+            continue
+        later = [_load(contact, system, meanings, numbers, time) for time in _other_times(system, t)]
+        largest = max((other for other in later if other is not None), default=0.0)
+        if load == 0.0 or load < _SMALL * largest:
+            compared = f", below {_SMALL:g} of its largest value {largest:.4g}" if load else ""
+            found.append(
+                f"the normal load of {contact.name} is {load:.4g} at t = {t:g}{compared}, at which the model is "
+                "linearized, and it changes with time: give the model its final load as a constant"
+            )
+    return tuple(found)
+
+
+def _load(
+    contact: Contact, system: System, meanings: Meanings, numbers: Mapping[str, float], t: float
+) -> float | None:
+    """Return the load of a contact at a time, or None if it is unknown."""
+    signals = zip(system.model.inputs, system.signals, strict=True)
+    here = {TIME: t} | {declared.name: _value(signal, t) for declared, signal in signals}
+    return number_of(contact.normal.tree, {**numbers, **here}, meanings.lookup)
+
+
+def _other_times(system: System, t: float) -> list[float]:
+    """Return times at which the load is compared: over a period, and the times of tables."""
+    times = [time for declared in system.model.inputs for time in declared.times]
+    period = common_period(system)
+    return times if period is None else [*times, *(t + period * k / _SAMPLES for k in range(1, _SAMPLES))]
 
 
 def _value(signal: Signal, t: float) -> float:

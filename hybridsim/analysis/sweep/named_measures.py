@@ -38,7 +38,7 @@ from hybridsim.engine.system.system import System
 from hybridsim.engine.system.system_cache import system_of
 from hybridsim.errors import UsageError, nearest
 from hybridsim.model import Model
-from hybridsim.model.checks.units import time_unit, units_of
+from hybridsim.model.checks.units import time_unit, unit_of_work, units_of
 from hybridsim.simulate import simulate
 
 STEADY, AFTER, T_SPAN = "steady", "after", "t_span"
@@ -188,6 +188,8 @@ def units_of_readings(reading_names: Iterable[str], model: Model) -> dict[str, s
             unit = known.get(rest.rpartition(".")[0] if head == "harmonic" else rest, "")
             squared = f"({unit})² {time}" if " " in unit or "/" in unit else f"{unit}² {time}"
             units[word] = (squared.strip() if head == _SQUARED else unit) if unit else ""
+        elif head == "dissipated":
+            units[word] = next((unit_of_work(model, c) for c in model.contacts if c.name == rest), "")
     return {word: unit for word, unit in units.items() if unit}
 
 

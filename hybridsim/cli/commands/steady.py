@@ -99,7 +99,7 @@ def execute(args: argparse.Namespace, session: Session) -> int:
 
 
 def _summary(found: SteadyState, record: dict[str, Any]) -> list[str]:
-    from hybridsim.model.checks.units import time_unit
+    from hybridsim.model.checks.units import time_unit, unit_of_work
 
     model = found.model
     lines = [f"{model.name}: {model.title}" if model.title else model.name, f"  {found.message}"]
@@ -109,9 +109,11 @@ def _summary(found: SteadyState, record: dict[str, Any]) -> list[str]:
         repeats = f" (x {found.multiple})" if found.multiple > 1 else ""
         lines.append(f"  period       {found.period:.12g} {time_unit(model)}".rstrip() + repeats)
     lines.append(f"  modes        {' '.join(found.word)}")
-    rubbing = {contact.name for contact in model.contacts}
+    rubbing = {contact.name: contact for contact in model.contacts}
     for name, share in record["stick_fraction"].items():
-        work = f", work {record['dissipated'][name]:.6g}" if name in rubbing else ""
+        work = ""
+        if name in rubbing:
+            work = f", work {record['dissipated'][name]:.6g} {unit_of_work(model, rubbing[name])}".rstrip()
         lines.append(
             f"  {name:<12} {100.0 * share:.4g} % of the period in {found.held_mode(name)}, "
             f"{record['stops_per_period'][name]:g} stops per period{work}"

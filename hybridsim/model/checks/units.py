@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from hybridsim.expr import Expression
 from hybridsim.model.parts.contact import Contact
 from hybridsim.model.parts.model import Model
+from hybridsim.model.units.parse import read_unit, write_unit
 
 _COUNT = 4  # multiples of 1/4 up to this count as dimensionless factors
 
@@ -35,6 +36,15 @@ def unit_of(model: Model, expression: Expression) -> str:
     """Return the unit of an expression if one of its terms has a known unit, otherwise ""."""
     units = units_of(model) | {q.name: q.unit for q in model.parameters}
     return _unit(expression.tree, units, {name: e.tree for name, e in model.definitions})
+
+
+def unit_of_work(model: Model, contact: Contact) -> str:
+    """Return the unit of the integral of force times relative velocity over time, or "" if it is unknown."""
+    texts = units_of(model)[contact.name], unit_of(model, contact.velocity), time_unit(model)
+    force, velocity, time = (read_unit(text) if text else None for text in texts)
+    if force is None or velocity is None or time is None:
+        return ""
+    return write_unit((force * velocity * time).without_angles(), ("J", "mJ", "kJ"))
 
 
 def rate_of(unit: str, time: str, order: int) -> str:

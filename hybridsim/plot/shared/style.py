@@ -30,6 +30,7 @@ MARK = "#c4c4c4"
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "p")
 SUFFIXES = (".png", ".pdf", ".svg")
 WIDTH = 7.3  # inches of a wide picture: 700 pixels of a page, which shows it unshrunk
+BROAD = 8.8  # inches of a picture with many panels: 845 pixels, the width of the text of a page
 _DPI = 150
 _PAD, _ROW = 6.0, 13.0  # points: above axes, and of a row of a legend
 _HANDLE, _LONG_HANDLE = 4, 8  # letters: the width of a legend's handle

@@ -272,6 +272,19 @@ def test_quantities(quantity: Any, exact: Any) -> None:
     assert found["no-friction"].value is not None
 
 
+def test_the_work_of_friction_is_that_of_the_run_with_a_changed_law_too() -> None:
+    """A block slows down from v = 3 by mu g = 1, and stops at t = 3: friction takes all of its energy, 9/2."""
+    states = [hs.State("x", 0, "v"), hs.State("v", 3, "-f")]
+    block = hs.Model("block", states, contacts=[hs.Contact("f", "v", 1, "coulomb", {"mu": 1.0})])
+    asked = {"t_span": (0, 4), "integrators": False, "rungs": ["karnopp", "tanh"]}
+    work = hs.advise(block, "dissipated.f", **asked)
+    stick = hs.advise(block, "stick_fraction.f", **asked)
+    assert work.value == pytest.approx(4.5, rel=1e-9) and stick.value == pytest.approx(0.25, rel=1e-9)
+    for name in ("karnopp", "tanh"):
+        assert work[name].value == pytest.approx(4.5, rel=1e-2)
+    assert stick["karnopp"].value == pytest.approx(0.25, rel=0.05) and stick["tanh"].value == 0.0
+
+
 def test_event_times_are_of_models_with_events() -> None:
     found = hs.advise("free-decay", "event_time.f.3", t_span=(0, 20), integrators=False)
     assert found.value == pytest.approx(3.0 * math.pi, rel=1e-12)

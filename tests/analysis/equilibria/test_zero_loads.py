@@ -44,6 +44,28 @@ def test_a_load_that_is_still_zero_is_named(normal: str) -> None:
     assert f"warning: {warning}" in str(found)
 
 
+@pytest.mark.parametrize(
+    ("normal", "t", "largest"),
+    [
+        ("N0*abs(sin(pi*t))", 1.0, 4.0),  # the sine of pi is 1.2e-16, not 0
+        ("N0*abs(wave)", 2.0, 4.0),
+        ("N0*(1.0001 - cos(pi*t/2))", 0.0, 8.0004),
+        ("N0*(table + 1e-4)", 0.0, 4.0004),
+    ],
+)
+def test_a_load_that_is_small_beside_its_largest_is_named(normal: str, t: float, largest: float) -> None:
+    model = pad(normal)
+    used = [signal for signal in model.inputs if signal.name in normal]
+    (warning,) = hs.linearize(replace(model, inputs=used), "slip-", t=t).warnings
+    assert f"at t = {t:g}, below 0.001 of its largest value {largest:.4g}," in warning
+
+
+def test_a_hundredth_of_the_largest_load_is_not_small() -> None:
+    waving = replace(pad("N0*(1.02 - cos(pi*t/2))"), inputs=())  # from 0.02 to 2.02 N0
+    found = hs.linearize(waving, "slip-")
+    assert found.warnings == () and found.growth == pytest.approx(0.02 * 0.05, rel=1e-9)
+
+
 def test_other_loads_are_not_named() -> None:
     constant = hs.linearize(pad("N0"), "slip-")
     assert constant.warnings == () and "warning" not in str(constant)

@@ -27,6 +27,7 @@ def test_readings_are_those_of_the_steady_state() -> None:
         assert found["word"][k] == " ".join(steady.word) and found["kind"][k] == steady.kind
     assert list(found.values) == list(WORDS)
     assert found.units == {"F0": "N", "amplitude.x": "m", "energy.x": "m² s", "harmonic.x.1": "m"}
+    assert hs.sweep("dfcs", {"F0": [30.0]}, ["dissipated.f"]).units["dissipated.f"] == "J"
 
 
 def test_warm_starts_find_the_same_orbits_by_any_number_of_workers() -> None:

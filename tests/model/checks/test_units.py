@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 import hybridsim as hs
-from hybridsim.model.checks.units import time_unit, units_of
+from hybridsim.model.checks.units import time_unit, unit_of_work, units_of
 
 
 @pytest.mark.parametrize(
@@ -51,6 +51,29 @@ def test_it_stands_in_tables_and_readings() -> None:
     assert hs.simulate(model, (0, 0.01)).table().units["f"] == "N"
     # a load that is a number leaves the unit to the coefficient
     assert units_of(hs.load("lugre-presliding"))["f"] == "N"
+
+
+@pytest.mark.parametrize(
+    ("force", "velocity", "unit"),
+    [
+        ("N", "m/s", "J"),
+        ("N", "mm/s", "mJ"),
+        ("kN", "m/s", "kJ"),
+        ("N m", "rad/s", "J"),  # an angle has no dimension
+        ("N m", "1/s", "J"),
+        ("N", "m/h", ""),  # the unit of t is unknown
+        ("", "m/s", ""),
+        ("N", "", ""),
+        ("grip", "m/s", ""),
+    ],
+)
+def test_the_unit_of_work_is_that_of_force_times_distance(force: str, velocity: str, unit: str) -> None:
+    states = [hs.State("x", 0, "v"), hs.State("v", 1, "-f", unit=velocity)]
+    parameters = [hs.Parameter("N", 1, unit=force), hs.Parameter("mu", 0.5)]
+    model = hs.Model("pad", states, parameters, contacts=[hs.Contact("f", "v", "N", "coulomb", {"mu": "mu"})])
+    if velocity == "m/h":
+        model = replace(model, parameters=(*model.parameters, hs.Parameter("wait", 1, unit="min")))
+    assert unit_of_work(model, model.contacts[0]) == unit
 
 
 @pytest.mark.parametrize(

@@ -24,7 +24,7 @@ __all__ = ["pictures"]
 
 def pictures(study: Study) -> dict[str, Callable[[], Figure]]:
     """Return the figures of a study in the order of the paper; the keys are the ends of their file names."""
-    step, interval = "steps per period, h0", "zero-velocity interval eps_v [m/s]"
+    step, interval = "steps per period, h0", "interval eps_v [m/s]"
     return {
         "figure-3": lambda: motions(study.figure_3, "Figure 3: F0/N = 0.75, r = 0.6", spectrum=True),
         "figure-4": lambda: convergence(

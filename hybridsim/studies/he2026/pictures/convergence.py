@@ -16,8 +16,8 @@ _LINES = {"r": "-", "N": "--", "F": ":"}
 def convergence(curves: Curves, title: str, label: str, published: float) -> Figure:
     """Draw the relative errors of A and E over the settings; a column is a method, a line is a case."""
     methods = list(curves.values)
-    figure = style.figure(2.6 * len(methods) + 0.6, 5.4)
-    style.put_title(figure, title)
+    figure = style.figure(min(2.6 * len(methods) + 0.6, style.BROAD), 5.4)
+    style.put_title(figure, f"{title}\nlinear between -{_LINEAR:g} and {_LINEAR:g} % (grey), logarithmic beyond", size=10)
     panels = figure.subplots(2, len(methods), sharex=True, sharey="row", squeeze=False)
     count: dict[str, int] = {}
     looks = {}
@@ -43,6 +43,7 @@ def convergence(curves: Curves, title: str, label: str, published: float) -> Fig
             style.dress(axes)
             axes.minorticks_off()
             axes.axhline(0.0, color=style.GREY, linewidth=0.8)
+            axes.axhspan(-_LINEAR, _LINEAR, color="#e8e8e8", zorder=0)
         panels[0, j].set_title(_title(method), fontsize=9, loc="left")
         panels[1, j].set_xlabel(label, fontsize=9)
         if curves.name == "eps_v":
@@ -52,10 +53,8 @@ def convergence(curves: Curves, title: str, label: str, published: float) -> Fig
         low = min(float(np.min(curves.values[m][c][i] / curves.exact[c][i])) for m in methods for c in looks)
         high = max(float(np.max(curves.values[m][c][i] / curves.exact[c][i])) for m in methods for c in looks)
         panels[i, 0].set_ylim(min(200.0 * (low - 1.0), -2 * _LINEAR), max(200.0 * (high - 1.0), 2 * _LINEAR))
-    handles, labels = panels[0, 0].get_legend_handles_labels()
-    figure.legend(
-        handles, labels, loc="outside lower center", ncols=6, frameon=False, fontsize=8, handlelength=2.6
-    )
+    handles, _ = panels[0, 0].get_legend_handles_labels()
+    style.legend_below(figure, handles)
     return figure
 
 

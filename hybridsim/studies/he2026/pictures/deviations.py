@@ -10,6 +10,7 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
+from matplotlib.patheffects import withStroke
 
 from hybridsim.plot.shared import style
 from hybridsim.studies.he2026.measured.deviation import EXACT, PUBLISHED, Maps
@@ -19,6 +20,7 @@ from hybridsim.studies.he2026.pictures.motions import column_title
 
 _COLOURS = "cividis"  # lightness is ordered in the same way for all types of colour vision
 _LOW, _HIGH = 0.3, 100.0  # per cent
+_OUTLINE = [withStroke(linewidth=3.2, foreground="black")]  # white lines are then seen on yellow too
 
 
 def edges(centres: np.ndarray) -> np.ndarray:
@@ -32,11 +34,12 @@ def edges(centres: np.ndarray) -> np.ndarray:
 def deviation_maps(maps: Maps, quantity: str) -> Figure:
     """Draw the deviation (Eq. 9) over r and F0/N, from two interpretations of the paper and from the exact value."""
     columns = (LITERAL.name, ZEROED.name, EXACT)
-    figure = style.figure(10.2, 6.4)
+    figure = style.figure(style.BROAD, 6.2)
     number = {"A": "10", "E": "11"}[quantity]
     style.put_title(
         figure,
         f"Figure {number}: {quantity}_D, the deviation of {quantity} without stick from {quantity} with it",
+        size=10,
     )
     panels = figure.subplots(len(SIGNS), len(columns), sharex=True, sharey=True)
     x, y = edges(maps.r), edges(maps.ratios)
@@ -49,7 +52,7 @@ def deviation_maps(maps: Maps, quantity: str) -> Figure:
                 x, y, np.clip(values, _LOW, _HIGH), norm=LogNorm(_LOW, _HIGH), cmap=_COLOURS, rasterized=True
             )
             _regions(axes, quantity)
-            axes.set_title(f"{sign.name}; {column_title(name)}", fontsize=9, loc="left")
+            axes.set_title(f"{sign.name};\n{column_title(name)}", fontsize=9, loc="left")
             axes.tick_params(labelsize=9)
             axes.set_ylim(y[0], 0.70)
         panels[i, 0].set_ylabel("F0/N", fontsize=9)
@@ -75,19 +78,20 @@ def _regions(axes: Axes, quantity: str) -> None:
         (low, high), (left, right) = PUBLISHED[quantity][level]["F0/N"], PUBLISHED[quantity][level]["r"]
         axes.add_patch(
             Rectangle(
-                (left, low), right - left, high - low, fill=False, edgecolor="white", linestyle=line, linewidth=1.4
+                (left, low), right - left, high - low, fill=False, edgecolor="white", linestyle=line, linewidth=1.4, path_effects=_OUTLINE
             )
         )  # fmt: skip
     ratio, r = PUBLISHED[quantity]["at"]
-    axes.plot([r], [ratio], "x", color="white", markersize=6)
+    axes.plot([r], [ratio], "x", color="white", markersize=6, markeredgewidth=1.6, path_effects=_OUTLINE)
 
 
 def step_lines(study: StepStudy) -> Figure:
     """Draw the deviation along the published ridge over the step and over the velocity interval."""
-    figure = style.figure(9.6, 4.0)
+    figure = style.figure(style.BROAD, 4.0)
     style.put_title(
         figure,
         "Deviation of A from the exact motion, root mean square over ten places along the published ridge",
+        size=10,
     )
     left, right = figure.subplots(1, 2)
     for k, sign in enumerate(SIGNS):

@@ -22,8 +22,8 @@ _MOST_STOPS = 8  # larger numbers are drawn as this one
 
 def stick_and_stops(truth: Truth) -> Figure:
     """Draw stick fraction, stops per period and amplitude of the exact motion, and the no-stop boundary."""
-    figure = style.figure(11.0, 4.0)
-    style.put_title(figure, "The exact steady motion; white: no stops above it (closed form)")
+    figure = style.figure(style.BROAD, 4.4)
+    style.put_title(figure, "The exact steady motion. White line: no stops above it (closed form)", size=10)
     panels = figure.subplots(1, 3, sharey=True)
     x, y = edges(truth.r), edges(truth.ratios)
     stick = panels[0].pcolormesh(
@@ -43,11 +43,11 @@ def stick_and_stops(truth: Truth) -> Figure:
         norm=LogNorm(float(np.nanmin(size)), float(np.nanmax(size))),
         rasterized=True,
     )
-    figure.colorbar(stick, ax=panels[0], label="share of the period in stick [%]")
-    bar = figure.colorbar(stops, ax=panels[1], label="stops per period")
+    figure.colorbar(stick, ax=panels[0], location="bottom", label="share of the period in stick [%]")
+    bar = figure.colorbar(stops, ax=panels[1], location="bottom", label="stops per period")
     bar.set_ticks(range(_MOST_STOPS + 1), labels=[*map(str, range(_MOST_STOPS)), f"{_MOST_STOPS}+"])
     bar.ax.minorticks_off()
-    figure.colorbar(amplitude, ax=panels[2], label="amplitude A [µm], N = 40 N")
+    figure.colorbar(amplitude, ax=panels[2], location="bottom", label="amplitude A [µm], N = 40 N")
     for axes, title in zip(panels, ("stick", "stops", "amplitude"), strict=True):
         _frame(axes, truth, title)
     panels[0].set_ylabel("F0/N", fontsize=9)
@@ -56,9 +56,12 @@ def stick_and_stops(truth: Truth) -> Figure:
 
 def simpler_models(truth: Truth) -> Figure:
     """Draw the error of the amplitude of each simpler model."""
-    figure = style.figure(11.0, 4.0)
+    figure = style.figure(style.BROAD, 3.8)
     style.put_title(
-        figure, "Deviation of the amplitude of simpler models from the exact one; white: no stops above it"
+        figure,
+        "Deviation of the amplitude of simpler models from the exact one. White line: no stops above it.\n"
+        "Grey: the body does not move, or the model has no answer.",
+        size=10,
     )
     panels = figure.subplots(1, len(MODELS), sharey=True)
     mesh: Any = None
@@ -73,12 +76,12 @@ def simpler_models(truth: Truth) -> Figure:
 
 def required_settings_map(required: RequiredSettings) -> Figure:
     """Draw the coarsest step and the largest velocity interval with which the error of A is below 1 %."""
-    figure = style.figure(9.6, 7.4)
+    figure = style.figure(style.BROAD, 7.0)
     style.put_title(
-        figure, "The coarsest setting that is within 1 % of the exact amplitude; hatched: the finest is not"
+        figure, "The coarsest setting that is within 1 % of the exact amplitude; hatched: the finest is not", size=10
     )
     panels = figure.subplots(2, 2, sharex=True, sharey=True)
-    rows = ((required.steps, STEPS, "steps per period, h0"), (required.eps, EPS, "eps_v [m/s]"))
+    rows = ((required.steps, STEPS, "steps per period h0, finest at the top"), (required.eps, EPS, "eps_v [m/s], finest at the top"))
     for line, (tables, ladder, label) in zip(panels, rows, strict=True):
         mesh: Any = None
         for axes, (name, table) in zip(line, tables.items(), strict=True):
@@ -99,7 +102,8 @@ def timed_map(timing: TimedMap) -> Figure:
     figure = style.figure(7.6, 4.2)
     style.put_title(
         figure,
-        f"Steady amplitude over a map: {timing.side} x {timing.side} points, error against time of a point",
+        f"Steady amplitude over a map of {timing.side} x {timing.side} points: error (median to largest) against time",
+        size=10,
     )
     axes = figure.subplots()
     for k, (name, entry) in enumerate(timing.entries.items()):
@@ -114,9 +118,9 @@ def timed_map(timing: TimedMap) -> Figure:
     plain_log(axes.xaxis)
     axes.set_yscale("log")
     axes.set_xlabel("time of a point, all threads together [ms]", fontsize=9)
-    axes.set_ylabel("relative error of A: median to largest", fontsize=9)
+    axes.set_ylabel("relative error of A", fontsize=9)
     style.dress(axes)
-    axes.legend(fontsize=8, frameon=False, loc="center left", bbox_to_anchor=(1.01, 0.5))
+    style.legend_below(figure, axes.get_legend_handles_labels()[0])
     return figure
 
 

@@ -36,7 +36,7 @@ def motions(runs: dict[str, Response], title: str, spectrum: bool = False) -> Fi
     """Draw x and f over two periods; with `spectrum`, also draw the harmonics of x."""
     names = [*(name for name in runs if name != "exact"), "exact"]
     rows = 3 if spectrum else 2
-    figure = style.figure(2.45 * len(names) + 0.6, 1.9 * rows + 0.6)
+    figure = style.figure(min(2.45 * len(names) + 0.6, style.BROAD), 1.9 * rows + 0.6)
     style.put_title(figure, title)
     panels = figure.subplots(rows, len(names), sharey="row", squeeze=False)
     for column, name in enumerate(names):
@@ -44,11 +44,12 @@ def motions(runs: dict[str, Response], title: str, spectrum: bool = False) -> Fi
         x, f = panels[0, column], panels[1, column]
         x.plot(run.t, _MICRO * run.x, color=colour, linewidth=1.1)
         f.plot(run.t, run.f, color=colour, linewidth=0.8)
-        x.set_title(column_title(name), fontsize=9, loc="left")
+        x.set_title(column_title(name).replace(", ", ",\n"), fontsize=9, loc="left")
         f.set_xlabel("time / period", fontsize=9)
         for axes in (x, f):
             style.dress(axes)
             axes.set_xlim(0.0, 2.0)
+            axes.set_xticks([0.0, 1.0, 2.0], labels=["0", "1", "2"])
         if spectrum:
             _harmonics(panels[2, column], run, colour)
     for axes, label in zip(
@@ -66,7 +67,6 @@ def _harmonics(axes: Axes, run: Response, colour: str) -> None:
     axes.set_yscale("log")
     axes.set_ylim(_LEAST, 3.0)
     axes.set_xlim(-0.7, orders[-1] + 0.7)
-    axes.set_xticks(orders[1::2])
+    axes.set_xticks(orders[1::4])
     style.dress(axes)
-    axes.tick_params(labelsize=8)
     axes.set_xlabel("harmonic of w", fontsize=9)
