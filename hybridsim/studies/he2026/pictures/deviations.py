@@ -112,11 +112,14 @@ def step_lines(study: StepStudy) -> Figure:
             EPS, 100.0 * study.along_eps(variant.name, "A"), color=style.PALETTE[k + 2],
             marker=style.MARKERS[k + 2], label=name,
         )  # fmt: skip
-    right.set_xlabel("zero-velocity interval eps_v [m/s]", fontsize=9)
+    right.set_xlabel("zero-velocity interval eps_v [µm/s]", fontsize=9)
     right.set_title("with stick, h0 = 1200", fontsize=10, loc="left")
-    for axes in (left, right):
+    left.set_ylim(bottom=0.25 * left.get_ylim()[0])  # room for the legends
+    right.set_ylim(top=8.0 * right.get_ylim()[1])
+    right.set_xticks(EPS, labels=[f"{1e6 * eps:g}" for eps in EPS])
+    for axes, place in ((left, "lower left"), (right, "upper left")):
         axes.set_ylabel("deviation [%]", fontsize=9)
         style.dress(axes)
         axes.minorticks_off()
-        axes.legend(fontsize=8, frameon=False)
+        axes.legend(fontsize=9, frameon=False, loc=place)
     return figure
