@@ -1,6 +1,6 @@
 """Checks pictures for text that is too small or too pale, labels that overlap, and circles that are not round.
 
-python docs/make/check_pictures.py        (all SVG files of docs/images, and the figures of the scripts that draw them)
+python docs/make/check_pictures.py        (all files of docs/images, and the figures of the scripts that draw the SVG files)
 """
 
 from __future__ import annotations
@@ -18,12 +18,14 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox
+from PIL import Image
 
 from hybridsim.plot.shared import style
 
 IMAGES = Path(__file__).parents[2] / "docs" / "images"
 COLUMN = 850  # pixels: the width of the text of a page on a wide screen
 LEAST_SIZE, LEAST_INDEX = 9.0, 8.0  # pixels of letters, and of indices and exponents
+LEAST_FONT = 8.0  # points: of the texts in PNG files, of which only the width is known
 LEAST_CONTRAST = 4.5  # of text, by WCAG 2.1
 PIXELS = 96 / 72  # of a page, for a point
 TOUCH = 1.0  # points by which the boxes of two texts may overlap
@@ -58,6 +60,14 @@ def faults_of_file(path: Path) -> list[str]:
             if float(size) * scale < least:
                 faults.append(f"{label!r} is too small: {float(size) * scale:.1f} pixels")
     return faults
+
+
+def faults_of_png(path: Path) -> list[str]:
+    """The fault of a PNG file that is so wide that a page shows its letters too small."""
+    with Image.open(path) as picture:
+        width = picture.width / round(picture.info.get("dpi", (96.0, 96.0))[0]) * 96
+    size = LEAST_FONT * PIXELS * min(1.0, COLUMN / width)
+    return [f"letters of {LEAST_FONT:g} points have {size:.1f} pixels"] if size < LEAST_SIZE else []
 
 
 def faults_of_figure(figure: Figure) -> list[str]:
@@ -112,6 +122,7 @@ def main() -> int:
     import landing_picture
 
     faults = {path.name: faults_of_file(path) for path in sorted(IMAGES.rglob("*.svg"))}
+    faults |= {path.name: faults_of_png(path) for path in sorted(IMAGES.rglob("*.png"))}
 
     def check(picture: Any, path: Path, **settings: Any) -> None:
         faults.setdefault(path.name, []).extend(faults_of_figure(style.figure_of(picture)))

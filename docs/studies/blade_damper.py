@@ -89,7 +89,9 @@ def picture(found: hs.Sweep, curves: hs.Sweep, blade: Blade) -> None:
         )
     response.set(xlabel="frequency of the excitation [rad/s]", ylabel="amplitude of x [mm]")
     response.yaxis.set_major_formatter("{x:g}")
-    response.legend(fontsize=9, ncols=2, loc="lower left", bbox_to_anchor=(0, 1), frameon=False, borderaxespad=0.2)
+    response.legend(
+        fontsize=9, ncols=2, loc="lower left", bbox_to_anchor=(0, 1), frameon=False, borderaxespad=0.2
+    )
     upper, lower = right.subplots(2, 1, sharex=True)
     fine = np.geomspace(loads[0], loads[-1], 400)
     theory = [1e3 * blade.first_harmonic(load) for load in fine]

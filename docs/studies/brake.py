@@ -107,7 +107,9 @@ def picture(growth: dict[float, np.ndarray], sizes: dict[float, np.ndarray]) -> 
     left.plot([], [], ".", ms=5, color=style.INK, label="simulation")
     left.axhline(0.0, color=style.INK, lw=0.8)
     left.set(xlabel="coefficient of friction mu", ylabel="growth rate")
-    left.legend(fontsize=9, loc="lower left", bbox_to_anchor=(0, 1), ncols=3, frameon=False, borderaxespad=0.2)
+    left.legend(
+        fontsize=9, loc="lower left", bbox_to_anchor=(0, 1), ncols=3, frameon=False, borderaxespad=0.2
+    )
     for shake, marker, colour in ((LARGE, "s", style.PALETTE[1]), (SHAKE, ".", style.PALETTE[0])):
         right.plot(
             FRICTION,
@@ -120,7 +122,9 @@ def picture(growth: dict[float, np.ndarray], sizes: dict[float, np.ndarray]) -> 
         )
     right.axvline(threshold(SQUEALING), color=style.GREY, lw=0.9, ls=":", label="onset, closed form")
     right.set(xlabel="coefficient of friction mu", ylabel=f"final amplitude of x, c = {SQUEALING:g}")
-    right.legend(fontsize=9, loc="lower left", bbox_to_anchor=(0, 1), ncols=2, frameon=False, borderaxespad=0.2)
+    right.legend(
+        fontsize=9, loc="lower left", bbox_to_anchor=(0, 1), ncols=2, frameon=False, borderaxespad=0.2
+    )
     for axes in (left, right):
         style.dress(axes)
     style.save(figure, PICTURE)

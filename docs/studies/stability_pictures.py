@@ -38,7 +38,13 @@ def theory(panel: Axes, case: Case, method: Method, steps: np.ndarray) -> None:
         return
     panel.plot(steps, case.too_fast_for_16(steps), **dotted, label="theory: above, 16 halvings suffice")
     if not case.belt_speed:
-        panel.axvline(case.late_release(), color=style.PALETTE[1], lw=1.4, ls="-.", label="theory: error of late releases is 1 %")
+        panel.axvline(
+            case.late_release(),
+            color=style.PALETTE[1],
+            lw=1.4,
+            ls="-.",
+            label="theory: error of late releases is 1 %",
+        )
 
 
 def maps(case: Case, found: dict[str, Map], star: tuple[float, str], path: Path) -> None:
@@ -55,7 +61,14 @@ def maps(case: Case, found: dict[str, Map], star: tuple[float, str], path: Path)
         boundary(panel, steps, zones, size, "white", "black", 2.4)
         rows, columns = np.nonzero(~np.isfinite(excess) | (np.abs(excess) > (0.11 if case.belt_speed else 0)))
         panel.plot(
-            steps[columns], zones[rows], "x", color="#b00000", ms=4, mew=1.2, clip_on=False, label="wrong number of stops"
+            steps[columns],
+            zones[rows],
+            "x",
+            color="#b00000",
+            ms=4,
+            mew=1.2,
+            clip_on=False,
+            label="wrong number of stops",
         )
         panel.plot([], [], "-", color="black", lw=2.4, label="error 1 %")
         panel.set(xscale="log", yscale="log", xlim=(steps[0], steps[-1]), ylim=(zones[0], zones[-1]))
@@ -94,7 +107,9 @@ def moves(
 ) -> None:
     """The 1 % lines of several cases, a row for what varies, a column for each method; right is below and right."""
     figure = style.figure(style.BROAD, 7.6)
-    style.put_title(figure, "Lines of 1 % error: right below and to the right. Star: T/1200 and 8e-4 m/s", size=10)
+    style.put_title(
+        figure, "Lines of 1 % error: right below and to the right. Star: T/1200 and 8e-4 m/s", size=10
+    )
     parts = figure.subfigures(len(groups), 1)
     for part, (says, cases) in zip(parts, groups.items()):
         row = part.subplots(1, len(methods), sharex=True, sharey=True)
@@ -132,7 +147,13 @@ def moves(
         for panel in row:
             panel.set(xlabel="steps per period, T/h")
         # below the panels: within them every corner has a line of some case
-        part.legend(handles=row[0].get_legend_handles_labels()[0], loc="outside lower center", ncols=2, fontsize=9, frameon=False)
+        part.legend(
+            handles=row[0].get_legend_handles_labels()[0],
+            loc="outside lower center",
+            ncols=2,
+            fontsize=9,
+            frameon=False,
+        )
     style.save(figure, path)
 
 
@@ -158,5 +179,11 @@ def chatter(found: dict[str, tuple[np.ndarray, np.ndarray]], path: Path) -> None
     panel.set(xlabel="steps per period, T/h", ylabel="relative error of the amplitude")
     panel.set_title("rk4-sign: worst of 50 periods", fontsize=10, loc="left")
     style.dress(panel)
-    figure.legend(handles=panel.get_legend_handles_labels()[0], loc="outside lower center", ncols=3, fontsize=9, frameon=False)
+    figure.legend(
+        handles=panel.get_legend_handles_labels()[0],
+        loc="outside lower center",
+        ncols=3,
+        fontsize=9,
+        frameon=False,
+    )
     style.save(figure, path)

@@ -23,6 +23,8 @@ from hybridsim.plot import animate, mechanism
 from hybridsim.plot.drawing import animation
 from hybridsim.plot.drawing.canvas import Canvas
 from hybridsim.plot.drawing.clip import Clip
+from hybridsim.plot.drawing.frame import Frame
+from hybridsim.plot.drawing.kinds import items_of
 from hybridsim.plot.drawing.layout import ends_of
 from hybridsim.plot.drawing.poses import poses_at
 from hybridsim.plot.drawing.theme import DARK, LIGHT, Theme
@@ -96,10 +98,31 @@ def test_packaged_models_are_drawn(name: str) -> None:
     """Without a run over their whole duration: the first moments show every shape."""
     model = hs.load(name)
     solution = hs.simulate(model, (0, 1e-3 * (model.duration_value() or 1.0)), integrator="scipy-dop853")
-    canvas = Canvas(solution, Window(solution.t_start, solution.t_end), DARK)
+    window = Window(solution.t_start, solution.t_end)
+    canvas = Canvas(solution, window, DARK)
     assert np.isfinite([*canvas.low, *canvas.high]).all() and (canvas.high > canvas.low).all()
     assert 0.05 < canvas.aspect < 20
     assert list(canvas.artists(mechanism(solution), solution.t_end))
+    for quantities in ([], [model.states[0].name]):
+        assert len(list(Clip(solution, quantities, window, None, 0.1, LIGHT).pictures())) == 2
+
+
+@pytest.mark.parametrize("speed", [0.9, -0.9])
+def test_a_damper_stays_between_its_ends(speed: float) -> None:
+    """A block that is moved from 1 to 1.9 or to 0.1 from the wall at x = 0."""
+    states = [hs.State("x", 1, repr(speed))]
+    shapes = [
+        hs.Shape("wall", "wall", at=(0, 0)),
+        hs.Shape("block", "mass", at=("x + 0.1", 0), size=(0.2, 0.2)),
+        hs.Shape("damper", "damper", ends=("wall", "block"), size=0.1),
+    ]
+    moved = hs.simulate(hs.Model("moved", states, drawing=shapes), (0, 1))
+    canvas = Canvas(moved, Window(0.0, 1.0), LIGHT)
+    for t in (0.0, 0.5, 1.0):
+        poses = poses_at(moved, np.array([t]))[0]
+        drawn = items_of(Frame({"damper": poses["damper"], **poses}, canvas.layout, LIGHT, {}))
+        x = np.concatenate([item.points[:, 0] for item in drawn if item.width < 4 and item.points.size > 0])
+        assert x.min() >= -canvas.layout.hatch - 1e-12 and x.max() <= 1.0 + speed * t + 0.2 + 1e-12
 
 
 def frames_of(path: Path) -> tuple[list[np.ndarray], list[int]]:

@@ -21,6 +21,7 @@ from hybridsim.plot.drawing.poses import poses_at
 from hybridsim.plot.drawing.theme import DARK, Theme, darken
 from hybridsim.plot.shared import style
 from hybridsim.plot.shared.smooth_parts import Window, require_length
+from hybridsim.plot.shared.strip import changing_components
 from hybridsim.plot.time_history import time_history
 from hybridsim.solution import Solution
 
@@ -65,8 +66,9 @@ class Clip:
     def _build(self, names: Sequence[str], window: Window) -> None:
         """Make the figure with all parts that do not move."""
         solution = self._solution
-        rows = len(names) + bool(solution.modes)
-        heights = [_CURVE] * len(names) + [0.1 + _ROW * len(solution.modes)] * bool(solution.modes)
+        changing = len(changing_components(solution))
+        rows = len(names) + bool(changing)
+        heights = [_CURVE] * len(names) + [0.1 + _ROW * changing] * bool(changing)
         aspect = self._canvas.aspect
         is_tall = aspect > _TALL and rows > 0
         height = min(_WIDTH * aspect, _DRAWN)

@@ -16,6 +16,7 @@ Points = NDArray[np.float64]
 LINES = ("ground", "wall", "belt")  # kinds with a surface
 _HATCH = 0.035  # largest depth of hatching as a part of the extent
 _SHARE = 0.17  # default size of a body as a part of the extent of all places
+_CLOSED = 0.8  # length of a closed damper as a part of its length when it is half open
 # Default sizes of each kind, relative to the unit.
 _SIZES: dict[str, tuple[float, ...]] = {
     "mass": (1.0, 0.68), "ball": (0.7, 0.7), "rotor": (1.7, 1.7), "wheel": (1.2, 1.2), "pendulum": (0.44, 0.44),
@@ -37,7 +38,7 @@ class Layout:
     hatch : the depth of the hatching behind a ground or wall.
     spans : by name of a ground, wall or belt, its two ends along its direction, counted from its place.
     sides : by name, 1 if the bodies are to the left of its direction, otherwise -1.
-    rests : by name of a spring or damper, its mean length.
+    rests : by name of a spring its mean length, and of a damper the length at which it is half open.
     """
 
     unit: float
@@ -81,6 +82,8 @@ def layout_of(poses: Sequence[Poses]) -> Layout:
         if len(pose.ends) == 2:
             lengths = [np.hypot(*np.subtract(*ends_of(one[name], one, layout))) for one in poses]
             rests[name] = float(np.mean(lengths))
+            if pose.shape.kind == "damper":  # its cylinder has room when the damper is shortest
+                rests[name] = min(rests[name], float(np.min(lengths)) / _CLOSED)
     return Layout(unit, hatch, spans, sides, rests)
 
 

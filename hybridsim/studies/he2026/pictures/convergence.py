@@ -17,7 +17,9 @@ def convergence(curves: Curves, title: str, label: str, published: float) -> Fig
     """Draw the relative errors of A and E over the settings; a column is a method, a line is a case."""
     methods = list(curves.values)
     figure = style.figure(min(2.6 * len(methods) + 0.6, style.BROAD), 5.4)
-    style.put_title(figure, f"{title}\nlinear between -{_LINEAR:g} and {_LINEAR:g} % (grey), logarithmic beyond", size=10)
+    style.put_title(
+        figure, f"{title}\nlinear between -{_LINEAR:g} and {_LINEAR:g} % (grey), logarithmic beyond", size=10
+    )
     panels = figure.subplots(2, len(methods), sharex=True, sharey="row", squeeze=False)
     count: dict[str, int] = {}
     looks = {}

@@ -78,10 +78,15 @@ def required_settings_map(required: RequiredSettings) -> Figure:
     """Draw the coarsest step and the largest velocity interval with which the error of A is below 1 %."""
     figure = style.figure(style.BROAD, 7.0)
     style.put_title(
-        figure, "The coarsest setting that is within 1 % of the exact amplitude; hatched: the finest is not", size=10
+        figure,
+        "The coarsest setting that is within 1 % of the exact amplitude; hatched: the finest is not",
+        size=10,
     )
     panels = figure.subplots(2, 2, sharex=True, sharey=True)
-    rows = ((required.steps, STEPS, "steps per period h0, finest at the top"), (required.eps, EPS, "eps_v [m/s], finest at the top"))
+    rows = (
+        (required.steps, STEPS, "steps per period h0, finest at the top"),
+        (required.eps, EPS, "eps_v [m/s], finest at the top"),
+    )
     for line, (tables, ladder, label) in zip(panels, rows, strict=True):
         mesh: Any = None
         for axes, (name, table) in zip(line, tables.items(), strict=True):
