@@ -1,6 +1,6 @@
 """Checks pictures for text that is too small or too pale, labels that overlap, and circles that are not round.
 
-python docs/make/check_pictures.py        (all files of docs/images, and the figures of the scripts that draw the SVG files)
+python docs/make/check_pictures.py        (all files of docs/images, and the figures of their scripts)
 """
 
 from __future__ import annotations
