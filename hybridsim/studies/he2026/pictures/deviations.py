@@ -76,7 +76,12 @@ def deviation_maps(maps: Maps, quantity: str) -> Figure:
 def _regions(axes: Axes, quantity: str) -> None:
     for level, line in (("above 10 %", "-"), ("above 5 %", "--")):
         (low, high), (left, right) = PUBLISHED[quantity][level]["F0/N"], PUBLISHED[quantity][level]["r"]
-        look = {"edgecolor": "white", "linestyle": line, "linewidth": 1.4, "path_effects": _OUTLINE}
+        look: dict[str, Any] = {
+            "edgecolor": "white",
+            "linestyle": line,
+            "linewidth": 1.4,
+            "path_effects": _OUTLINE,
+        }
         axes.add_patch(Rectangle((left, low), right - left, high - low, fill=False, **look))
     ratio, r = PUBLISHED[quantity]["at"]
     axes.plot([r], [ratio], "x", color="white", markersize=6, markeredgewidth=1.6, path_effects=_OUTLINE)
