@@ -20,7 +20,6 @@ COMPILED = {"kernel", "inlined", "allocating_kernel", "polynomial_kernel", "merg
 
 # The sizes above which none of these may grow.
 FILES = {
-    "analysis/advise/question.py": 324,
     "analysis/continuation/continuation.py": 323,
     "analysis/steady/steady_state.py": 469,
     "analysis/variations/carried.py": 343,
