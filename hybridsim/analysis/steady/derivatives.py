@@ -90,6 +90,7 @@ class SteadySensitivities(Readable):
     start_by_parameter: np.ndarray
     period_by_parameter: np.ndarray
     _over_time: OverTime = field(repr=False, compare=False)
+    _is_free: bool = field(repr=False, compare=False)
 
     @refusing
     def of(self, reading: str, *quantities: str) -> SteadyReading:
@@ -120,7 +121,10 @@ class SteadySensitivities(Readable):
         over = self._over_time
         over.require(names)
         solution = over.solution
-        readings = Readings(over, solution.t_start, solution.t_end, self.parameters)
+        # With forcing, the end of the period is its start one period later, for which an extreme value counts once.
+        # Without, the start is on a plane across the flow, and an event there moves by an unknown time.
+        end_shift = None if self._is_free else self.period_by_parameter
+        readings = Readings(over, solution.t_start, solution.t_end, self.parameters, end_shift)
         title, length = f"{reading} of {' * '.join(names)}", solution.t_end - solution.t_start
         if reading not in ("integral", "mean"):
             return SteadyReading(title, *readings.of(reading, names))
@@ -179,7 +183,7 @@ def steady_sensitivities(
         start = np.linalg.solve(np.eye(count) - monodromy, by + np.outer(rates, period))
     n = system.n
     moved = OverTime(solution, Directions(start[:n], start[n:], slopes), BothSides)
-    return SteadySensitivities(states, tuple(parameters), start, period, moved)
+    return SteadySensitivities(states, tuple(parameters), start, period, moved, is_free)
 
 
 def _free(monodromy: np.ndarray, by: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

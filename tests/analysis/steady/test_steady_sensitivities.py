@@ -143,6 +143,26 @@ def test_stick_and_slip_under_a_forcing() -> None:
         assert found.by_parameter[k] == pytest.approx((high - low) / (2 * step), rel=1e-6)
 
 
+WAVE = {"a": 1.2, "T": 2.0, "d": 0.3, "L": 2.5}
+
+
+def least(a: mp.mpf, T: mp.mpf, d: mp.mpf, L: mp.mpf) -> mp.mpf:
+    """The value at the end of the low part of a square wave, from which x rises for the time d T."""
+    up, down = mp.exp(-a * d * T), mp.exp(-a * (1 - d) * T)
+    top = L / a * (1 - up - up * (1 - down)) / (1 - up * down)
+    return -L / a + (top + L / a) * down
+
+
+@pytest.mark.parametrize("phase", [0.0, 0.5])
+def test_a_kink_at_the_start_of_the_period(phase: float) -> None:
+    """x' = u - a x under a square wave is least where u rises: at the start and the end of the period, or inside it."""
+    wave = hs.Input("u", "wave", shape="square", amplitude="L", period="T", duty="d", phase=phase)
+    model = hs.Model("wave", parameters=WAVE, states=[hs.State("x", 0, "u - a*x", nominal=1)], inputs=[wave])
+    steady = hs.steady_state(model)
+    agrees(steady, ("minimum", "x"), least, WAVE)
+    agrees(steady, ("period",), lambda a, T, d, L: T, WAVE)
+
+
 def test_a_rest() -> None:
     """A damped oscillator rests at b/k."""
     model = hs.Model(

@@ -77,10 +77,24 @@ def quantities_of(reading: Any, quantities: Sequence[Any]) -> tuple[str, ...]:
 
 
 class Readings:
-    """Computes readings of a part of a run, from `first` to `last`, with their derivatives in M directions."""
+    """Computes readings of a part of a run, from `first` to `last`, with their derivatives in M directions.
 
-    def __init__(self, found: OverTime, first: float, last: float, changes: Sequence[str]) -> None:
+    Parameters
+    ----------
+    changes : names of the directions.
+    end_shift : derivatives (M,) of `last`, by default zero. They count for an extreme value at this end.
+    """
+
+    def __init__(
+        self,
+        found: OverTime,
+        first: float,
+        last: float,
+        changes: Sequence[str],
+        end_shift: np.ndarray | None = None,
+    ) -> None:
         self._found, self._changes = found, changes
+        self._end_shift = np.zeros(found.width) if end_shift is None else end_shift
         self._low, self._high = min(first, last), max(first, last)
         self._sign = 1.0 if last >= first else -1.0
         self._solution = found.solution
@@ -142,6 +156,8 @@ class Readings:
                     f"time span; a change of {by} moves the event, so there is no derivative",
                     remedy="use a part of the run that ends earlier or later, t_span=(a, b)",
                 )
+            if (place.number, place.s) == extremes.limits[1]:
+                shift = shift + self._end_shift
         return found.moving(extremes.name, place.number, place.s, is_after, shift)
 
     def _time(self, place: Place) -> float:
