@@ -159,8 +159,7 @@ class Settling:
             self._is_exhausted = len(pairs) >= _ENOUGH
             self._wait, self._waited = max(_EVERY, len(pairs) // 2), 0
             return
-        if self._beyond:
-            limit += self._beyond * _along(last, limit - after[-1], scale)
+        limit += self._beyond * (limit - after[-1])
         is_near = relative(limit - after[-1], scale) <= _NEAR
         self._trial = _Trial(
             self.map.snapshot(), self._states, self._pairs, self._fresh, self.map.slips, self._events, is_near
@@ -178,7 +177,7 @@ class Settling:
         if ratio < _CLOSER and (self._events == trial.events or (trial.is_near and not is_lost)):
             self.extrapolations += 1
             self._slowest, self._wait, self._is_exhausted = trial.change, 0, False
-            self._is_squared = _SQUARED[0] < ratio < _SQUARED[1]
+            self._is_squared = self._beyond > 0.0 or _SQUARED[0] < ratio < _SQUARED[1]
             self._beyond = _TWICE if self._is_squared else 0.0
             return True
         self.map.restore(trial.former)
@@ -197,10 +196,3 @@ class Settling:
             return True
         self._may_extrapolate, self._states = False, [self.map.x]
         return False
-
-
-def _along(direction: np.ndarray, vector: np.ndarray, scale: np.ndarray) -> np.ndarray:
-    """Return the component of a vector (2n,) in a direction, in units of the scale of each state."""
-    used = np.where(scale > 0.0, scale, np.inf)
-    unit = direction / used
-    return direction * float(unit @ (vector / used)) / float(unit @ unit)
