@@ -311,5 +311,5 @@ def test_growth_near_one_is_told_from_a_neutral_direction(growth: float, expecte
 
     linear: Any = Linear(0.0)
     linear.x = np.zeros(2)
-    assert grows(linear, np.zeros(2), np.ones(2), 1, np.array([0.3, 1.0])) is expected
+    assert grows(linear, np.ones(2), 1, np.array([0.3, 1.0])) is expected
     assert (linear.x == 0.0).all() is not expected

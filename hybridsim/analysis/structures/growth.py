@@ -11,32 +11,29 @@ _CHANGE = 1e-6  # of the scale: the change of the states
 _ROUND = 4  # repetitions after which the growth is measured
 _MOST = 32  # rounds
 _CLEAR = 0.1  # distance from one of a growth that needs few digits
-_EQUAL = (0.02, 5e-5)  # difference of two growths that have converged, clearly away from one and near one
+_EQUAL = (0.05, 5e-5)  # difference of two growths that have converged, clearly away from one and near one
 _GONE = 1e-3  # smallest change that matters, relative to the first one
 _NEUTRAL = 2e-4  # growth per repetition that is allowed, as of a direction in which a contact sticks anywhere
 
 
-def grows(
-    period_map: PeriodMap, drift: np.ndarray, scale: np.ndarray, multiple: int, direction: np.ndarray
-) -> bool:
+def grows(period_map: PeriodMap, scale: np.ndarray, multiple: int, direction: np.ndarray) -> bool:
     """Return whether a change (2n,) in a direction grows over repetitions of a motion; if not, restore the map.
 
-    drift: the change of the states over one repetition, which is not zero exactly.
-
     After some repetitions the change is in the direction that shrinks least or grows fastest. Its growth over a
-    repetition then converges to the size of the largest multiplier. The motion is followed until the growth has
-    converged, or the change is gone. If the change grows, the map goes on from the changed states.
+    repetition then converges to the size of the largest multiplier. The motion is followed with and without the
+    change until the growth has converged, or the change is gone. If the change grows, the map goes on from the
+    changed states.
     """
-    start, x = period_map.snapshot(), period_map.x
-    period_map.put(x + _CHANGE * direction / relative(direction, scale))
+    start = plain = period_map.snapshot()
+    period_map.put(period_map.x + _CHANGE * direction / relative(direction, scale))
+    changed = period_map.snapshot()
     used = scale > 0.0
-    size, growth, y = _CHANGE, np.inf, x
+    size, growth = _CHANGE, np.inf
     for k in range(_MOST):
-        for _ in range(_ROUND * multiple):
-            y = period_map.advance()
+        plain, x = _followed(period_map, plain, _ROUND * multiple)
+        changed, y = _followed(period_map, changed, _ROUND * multiple)
         former, earlier = size, growth
-        left = y - x - (k + 1) * _ROUND * drift
-        size = float(np.linalg.norm(left[used] / scale[used]))
+        size = float(np.linalg.norm((y - x)[used] / scale[used]))
         growth = (size / former) ** (1.0 / _ROUND) if size > 0.0 else 0.0
         is_clear = abs(growth - 1.0) > _CLEAR
         if size <= _GONE * _CHANGE or (k > 0 and abs(growth - earlier) < _EQUAL[0 if is_clear else 1]):
@@ -45,3 +42,13 @@ def grows(
         return True
     period_map.restore(start)
     return False
+
+
+def _followed(
+    period_map: PeriodMap, start: tuple[np.ndarray, ...], periods: int
+) -> tuple[tuple[np.ndarray, ...], np.ndarray]:
+    """Return the map and the states (2n,) some periods after a start."""
+    period_map.restore(start)
+    for _ in range(periods):
+        period_map.advance()
+    return period_map.snapshot(), period_map.x

@@ -173,7 +173,8 @@ class Settling:
         if trial is None:
             return True
         ratio = relative(self._states[-1] - self._states[-2], scale) / relative(trial.change, scale)
-        is_lost = any(self.map.slips.get(slip, 0) < count for slip, count in trial.slips.items())
+        slips = self.map.slips
+        is_lost = any(slips.get(slip, 0) < count for slip, count in trial.slips.items())
         if ratio < _CLOSER and (self._events == trial.events or (trial.is_near and not is_lost)):
             self.extrapolations += 1
             self._slowest, self._wait, self._is_exhausted = trial.change, 0, False
@@ -191,8 +192,7 @@ class Settling:
         """Return whether a change in the slowest direction does not grow; if it does, go on from the changed states."""
         if not (self.extrapolations and self._may_extrapolate):
             return True
-        change = passings.values[-1] - passings.values[-1 - multiple]
-        if not grows(self.map, change, passings.scale, multiple, self._slowest):
+        if not grows(self.map, passings.scale, multiple, self._slowest):
             return True
         self._may_extrapolate, self._states = False, [self.map.x]
         return False
