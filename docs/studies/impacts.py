@@ -63,10 +63,10 @@ The largest gain is {most:.1e} of the kinetic energy of the change of velocities
 
 `docs/studies/impacts.py` draws random mechanisms of up to 7 coordinates with dense mass matrices. Up to 3 gaps
 close at the same instant or are closed before. Each gap has a restitution between 0 and 1. Friction acts in up to 2
-directions. The load of such a direction is the impulse of one gap, and the coefficient of friction is between 0 and
-1. Let u- and u+ be the rates before and after the impact. The work of the impulses P is the change of kinetic
-energy, P.(u- + u+)/2. The table gives this work relative to P.G P/2, which is the kinetic energy of the change of
-velocities.
+directions. In each of these directions the normal impulse is that of one gap. The coefficient of friction is
+between 0 and 1. Let u- and u+ be the rates before and after the impact. The work of the impulses P is the change of
+kinetic energy, P.(u- + u+)/2. The table gives this work relative to P.G P/2, which is the kinetic energy of the
+change of velocities.
 
 | gaps | with friction | impacts | rebound reduced | several outcomes | none | largest gain | median loss |
 | --- | --- | --- | --- | --- | --- | --- | --- |

@@ -96,9 +96,9 @@ order one, d equals its error. The verdicts are defined as follows:
   of the motion, or below 2 % in runs with the most steps. The run by the other integrator must end with the same
   status. The difference of the two runs by hybridsim must not be larger than the effect of a change of the start by
   1e-6.
-- A run is *sensitive* from the time on at which the other method depends too strongly on the start. After this time, a
-  change of the start by 1e-5 changes the result of the other method by more than 3e-3. The causes are grazing
-  impacts, stops that barely happen, and chaos. The run must agree up to this time.
+- A run is *sensitive* after the time at which the other method begins to depend too strongly on the start. After
+  this time, a change of the start by 1e-5 changes the result of the other method by more than 3e-3. The causes are
+  grazing impacts, stops that barely happen, and chaos. The run must agree up to this time.
 - A run is *unresolved* if the other method has not converged at its smallest step.
 - A run *disagrees* in all other cases.
 
