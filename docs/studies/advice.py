@@ -185,7 +185,7 @@ def page(
         "",
         "Does `advise` name the simplest adequate model? Its answer differs from a search through all "
         f"models at **{len(wrong) + len(near) + len(dear)}** of {count} random points. At {len(near)} of "
-        "these points the difference is doubtful, because an error is within 0.01 % of the tolerance. At "
+        "these points an error is so close to the tolerance (0.01 %) that the difference is doubtful. At "
         f"{len(dear)} points `advise` had stopped an adequate model, because the model takes far more time "
         "than the full model.",
         "",

@@ -253,8 +253,9 @@ additional velocity at the end of this interval.
 - `dahl`, `lugre`: d = mu N exp(-sigma x/(mu N)), with the stiffness sigma. Then x is of size 1/sigma, s of size
   sigma^(-1/3) and v of size sigma^(-2/3). The damping of the bristles is sqrt(sigma_0 m) v d/(mu N), which is
   smaller than d by a factor of sigma^(-1/6).
-- `jenkins`: d = 0 when the force reaches mu N. The error is the vibration of the body on the spring, which begins at
-  each stop. The vibration causes slip when the applied force grows. At the release the vibration of x is of size 1/k.
+- `jenkins`: d = 0 when the force reaches mu N. The error comes from the vibration of the body on the spring, which
+  begins at each stop. The vibration causes slip when the applied force grows. At the release the vibration of x is
+  of size 1/k.
 - `karnopp`: the release is located exactly. At the stop before the release, the body sticks too early by the time
   v0/a, where a is its deceleration. The distance to the true position of the stop is v0^2/(2 a).
 

@@ -285,7 +285,7 @@ continues with a speed outside of the zone. In the reference model this has no e
 On the belt, with fewer than about 90 steps per period, sticks are missed.
 
 **Step too long.** Releases are late, and stops are missed. A release is placed at the end of its step. If the
-release is a whole step late, the slip ends at another place, which gives the limit in the table ("late release:
+release is a whole step late, the slip ends at another place. The table gives the limit that follows ("late release:
 theory"). The measured limit is lower, because a release is rarely a whole step late. With fewer than 10 steps per
 period stops are missed. There are two causes. The velocities at both ends of a step have the same sign, or the
 state after the bisection is beyond the next release. On the belt a trial step beyond v = 0 still uses the friction
