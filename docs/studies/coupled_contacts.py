@@ -97,7 +97,7 @@ are at rest or move. The applied force is harmonic. Each run lasts {SPAN:g} unit
 
 At each event the script tries all combinations of stick, slip forward and slip backward for the contacts at rest.
 For each combination it computes the accelerations, the forces and two time derivatives of the forces. It solves the
-whole system of equations in 40 digits, with none of the methods of hybridsim (Delassus operator and pivoting). The
+whole system of equations in 40 digits, without a Delassus operator and without pivoting, which hybridsim uses. The
 decision of the run must be among the admissible combinations. Each system also runs with its coordinates and
 contacts in {ORDERS} other orders of declaration.
 

@@ -185,7 +185,7 @@ If the largest speed is 0.1 m/s, a share of 0.5 % is eps_v = 5e-4 m/s. Options a
 
 `stick_velocity=kept` selects the method in the row with the kept velocity. `model.regularized("tanh", v0=5e-5)` and
 `model.regularized("karnopp", v0=5e-4)` are the regularized laws, for `rk4-sign` or any other integrator. Static
-friction must not be larger than kinetic friction if you use tanh. Other models raise an error.
+friction must not be larger than kinetic friction if you use tanh. A model with larger static friction is an error.
 
 You do not know the largest speed in advance. It is small just above the threshold of motion, and a zone then causes
 the largest errors. Run the model once, read the largest speed, and compare the zone with it. Near the threshold (F0/N

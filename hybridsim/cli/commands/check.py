@@ -26,7 +26,7 @@ def add_to(commands: Any) -> None:
     """Add the command `check` to the parser."""
     parser = commands.add_parser(
         "check",
-        help="check a model and print its automaton",
+        help="check a model and print its modes",
         description="Read a model, report every error, warn about suspicious parts (guards that never fire, pulses "
         "that a step may miss, units that are missing or disagree), and print the hybrid automaton of the model.",
     )
