@@ -24,15 +24,17 @@ def zero_loads(system: System, t: float, x: np.ndarray) -> tuple[str, ...]:
     """Return a warning for each contact whose load depends on time, and is zero or small at time t and states x.
 
     A load is small relative to the largest one over a period of the forcing and at the times of tables, with the same
-    states. A load is left out if it depends on a variable that the modes of a component set.
+    states. A quantity that a schedule sets depends on time. A load is left out if it depends on a variable that the
+    modes of a component set.
     """
     model = system.written
-    meanings, inputs = Meanings(model), {declared.name for declared in model.inputs}
+    meanings, timed = Meanings(model), {TIME, *(declared.name for declared in model.inputs)}
+    timed |= {name for schedule in model.schedules for name in schedule.reset}
     states = dict(zip(system.names, x.tolist(), strict=True))
     numbers = {**model.parameter_values(), **model.discrete_values(), **states}
     found = []
     for contact in model.contacts:
-        if not meanings.depended_on(contact.normal.names) & {TIME, *inputs}:
+        if not meanings.depended_on(contact.normal.names) & timed:
             continue
         load = _load(contact, system, meanings, numbers, t)
         if load is None:

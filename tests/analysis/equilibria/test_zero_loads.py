@@ -66,6 +66,13 @@ def test_a_hundredth_of_the_largest_load_is_not_small() -> None:
     assert found.warnings == () and found.growth == pytest.approx(0.02 * 0.05, rel=1e-9)
 
 
+@pytest.mark.parametrize(("start", "is_named"), [(0.0, True), (2.0, False)])
+def test_a_load_that_a_schedule_applies_is_named(start: float, is_named: bool) -> None:
+    applied = hs.Schedule("applied", times=[1], reset={"load": 1})
+    model = replace(_only("N0*load"), discrete=[hs.Discrete("load", start)], schedules=[applied])
+    assert bool(hs.linearize(model, "slip-").warnings) == is_named
+
+
 def test_other_loads_are_not_named() -> None:
     constant = hs.linearize(pad("N0"), "slip-")
     assert constant.warnings == () and "warning" not in str(constant)
