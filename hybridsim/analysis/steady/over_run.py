@@ -18,8 +18,9 @@ from hybridsim.solution import Solution
 
 _ENDS = np.array([-1.0, 1.0])
 _BISECTIONS = 200  # more than enough for doubles
-_ROUNDING = 1e-12  # of the values of a piece and of the level: a quantity beyond the level by less touches it
-_LEAST = 4.0 * np.finfo(float).eps  # the same, of the largest value of the run
+_ROUNDING = (
+    1e-12  # of the largest value of the run, and of the level: a quantity beyond the level by less touches it
+)
 
 
 class OverRun(Measures):
@@ -84,9 +85,8 @@ def first_passage(orbit: Orbit, level: float, sign: float) -> float:
     The orbit has one quantity. Where no polynomial represents it, the time is that of a Gauss point.
     """
     intervals, local, values = _knots(orbit)
-    sizes = np.fmax.reduce(np.abs(orbit.values[:, :, 0]), axis=1)
-    rounding = _ROUNDING * np.fmax(sizes, abs(level)) + _LEAST * np.fmax.reduce(sizes)
-    beyond = np.flatnonzero(sign * (values - level) > rounding[intervals])
+    largest = np.fmax.reduce(np.abs(orbit.values), axis=None, initial=abs(level))
+    beyond = np.flatnonzero(sign * (values - level) > _ROUNDING * largest)
     if not len(beyond):
         return math.inf
     j, k = int(beyond[0]), int(intervals[beyond[0]])

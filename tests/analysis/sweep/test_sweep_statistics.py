@@ -124,6 +124,16 @@ def test_a_touch_of_a_level_is_no_passage() -> None:
     found = one(ball, ["first_passage.h<0", "first_passage.w>2"], t_span=(5, 8))
     assert found["first_passage.h<0"] == math.inf
     assert found["first_passage.w>2"] == pytest.approx(5.0 + math.sqrt(2.0 / 9.81), rel=1e-9)
+    hit = hs.Guard("hit", "h", hs.Choice("fly", reset={"w": "-0.6*w"}))
+    bounces = hs.Component(
+        "bounces",
+        [hs.Mode("fly", hit), hs.Mode("rest", der={"h": 0, "w": 0})],
+        initial="fly",
+        limit="rest",  # h is there -3e-14
+    )
+    states = [hs.State("h", 0.8, "w"), hs.State("w", 0.0, "-g")]
+    resting = hs.Model("resting", parameters={"g": 10.0}, states=states, components=[bounces])
+    assert one(resting, ["first_passage.h<0"], t_span=(0, 4)) == {"first_passage.h<0": math.inf}
     half = math.pi / math.sqrt(1.0 - RATIO**2)
     for integrator in ("exact", "taylor", "tsit5"):
         passages = ["first_passage.x>1", "first_passage.v>0"]
