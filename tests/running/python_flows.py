@@ -1,4 +1,7 @@
-"""Models of Python functions that several tests run: a ball that bounces, and an oscillator."""
+"""Models of Python functions that several tests run: a ball that bounces, and an oscillator.
+
+Their functions stand in the module, so that the models of all tests share one compiled code.
+"""
 
 from __future__ import annotations
 
@@ -46,12 +49,16 @@ def oscillate(t: float, x: Any, p: Any) -> Any:
     return rates
 
 
+def energy(t: float, x: Any, p: Any) -> Any:
+    return 0.5 * (x[1] ** 2 + p.w**2 * x[0] ** 2)
+
+
 def oscillator(**changes: Any) -> hs.Model:
     fields: dict[str, Any] = {
         "states": {"x": 1.0, "v": 0.0},
         "parameters": {"w": 3.0},
         "flow": oscillate,
         "monitors": [hs.Monitor("zero", height, direction="down")],
-        "outputs": {"energy": lambda t, x, p: 0.5 * (x[1] ** 2 + p.w**2 * x[0] ** 2)},
+        "outputs": {"energy": energy},
     }
     return hs.Model("oscillator", **(fields | changes))

@@ -56,9 +56,17 @@ def cool(t: float, x: Any, p: Any) -> Any:
     return (-x[0],)
 
 
+def warm(t: float, x: Any, p: Any) -> Any:
+    return p.high - x[0]
+
+
+def cold(t: float, x: Any, p: Any) -> Any:
+    return x[0] - p.low
+
+
 def thermostat(start: float = 15.0, mode: str = "on", low: Any = None) -> hs.Model:
-    on = hs.Mode("on", [hs.Guard("warm", lambda t, x, p: p.high - x[0], "off")], flow=heat)
-    off = hs.Mode("off", [hs.Guard("cold", low or (lambda t, x, p: x[0] - p.low), "on")])
+    on = hs.Mode("on", [hs.Guard("warm", warm, "off")], flow=heat)
+    off = hs.Mode("off", [hs.Guard("cold", low or cold, "on")])
     return hs.Model(
         "thermostat",
         states={"T": start},
@@ -136,16 +144,24 @@ def test_a_velocity_inside_rounding_is_said_to_be_undecided() -> None:
 # -- series and Jacobians by differences --------------------------------------------------------------------
 
 
+def decay_and_turn(t: float, x: Any, p: Any) -> Any:
+    """Rates of x = exp(-t/T) and y = cos(2 pi t/T)."""
+    w = 2.0 * math.pi / p.T
+    return -x[0] / p.T, -w * math.sin(w * t)
+
+
+def product(t: float, x: Any, p: Any) -> Any:
+    return x[0] * x[1] - 0.5
+
+
 @pytest.mark.parametrize("scale", [1e-6, 1.0, 1e3])
 @pytest.mark.parametrize("t0", [0.0, 0.7, 12.5])
 def test_series_by_differences_hold_the_exact_ones_within_their_bounds(scale: float, t0: float) -> None:
-    # x = exp(-t/T) and y = cos(2 pi t/T), so that whole periods are tempting steps; guard x y - 1/2
-    def flow(t: float, x: Any, p: Any) -> Any:
-        w = 2.0 * math.pi / p.T
-        return -x[0] / p.T, -w * math.sin(w * t)
-
-    product = hs.Monitor("g", lambda t, x, p: x[0] * x[1] - 0.5)
-    model = hs.Model("m", states={"x": 1, "y": 1}, parameters={"T": scale}, flow=flow, monitors=[product])
+    # whole periods are tempting steps
+    monitors = [hs.Monitor("g", product)]
+    model = hs.Model(
+        "m", states={"x": 1, "y": 1}, parameters={"T": scale}, flow=decay_and_turn, monitors=monitors
+    )
     system = system_of(model)
     t, w = t0 * scale, 2.0 * math.pi
     x = np.array([math.exp(-t0), math.cos(w * t0)])
