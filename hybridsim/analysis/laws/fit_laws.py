@@ -109,9 +109,11 @@ def fit_laws(
     shared = mapping(unknowns, "unknowns")
     rows: list[LawFit] = []
     for entry in laws:
-        label, changed, own = _declared(model, contact, entry)
+        label, changed, own = _declared(model, contact, entry, [row.label for row in rows])
         if label in [row.label for row in rows]:
-            raise UsageError(f"`laws` contains '{label}' twice", remedy="pass each law once")
+            raise UsageError(
+                f"`laws` contains '{label}' twice", remedy="pass the law with different fixed parameters"
+            )
         if not {**shared, **own}:
             raise UsageError(
                 f"the law '{label}' has no unknown",
@@ -138,8 +140,13 @@ def fit_laws(
     return LawFits(model.title or model.name, contact, tuple(rows))
 
 
-def _declared(model: Model, contact: str, entry: Any) -> tuple[str, Model, dict[str, Unknown]]:
-    """Return the label of a law, the model under it, and its unknowns as parameters of the model."""
+def _declared(
+    model: Model, contact: str, entry: Any, taken: Sequence[str]
+) -> tuple[str, Model, dict[str, Unknown]]:
+    """Return the label of a law, the model under it, and its unknowns as parameters of the model.
+
+    The label contains the fixed parameters if the name of the law is `taken`.
+    """
     law, values = entry if isinstance(entry, tuple) and len(entry) == 2 else (entry, {})
     if not isinstance(values, Mapping):
         raise cannot_be("an entry of `laws`", entry, _LAWS)
@@ -164,6 +171,7 @@ def _declared(model: Model, contact: str, entry: Any) -> tuple[str, Model, dict[
         values_of_law[name] = f"{contact.replace('.', '_')}_{name}"
         own[values_of_law[name]] = unknown
         more.append(Parameter(values_of_law[name], guess))  # type: ignore[arg-type]  # it is converted
+    fixed = ", ".join(f"{name}={value}" for name, value in values.items() if values_of_law[name] not in own)
     widened = replace(model, parameters=(*model.parameters, *more))
     try:
         ((label, changed),) = models_under(widened, [(law, values_of_law)], contact).items()
@@ -175,7 +183,7 @@ def _declared(model: Model, contact: str, entry: Any) -> tuple[str, Model, dict[
             f"{error.message}, with the first guess {guesses}",
             remedy=f"{error.remedy}; hs.Unknown(low, high, guess=...) sets a guess",
         ) from error
-    return label, changed, own
+    return (f"{label} ({fixed})" if label in taken and fixed else label), changed, own
 
 
 def _rank(row: LawFit) -> tuple[float, float]:

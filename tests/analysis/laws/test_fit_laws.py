@@ -92,6 +92,14 @@ def test_shared_unknowns_and_fixed_parameters() -> None:
     assert found.rows[0].fit.values == {"v0": pytest.approx(2.0, abs=1e-6)}
 
 
+def test_one_law_with_several_fixed_parameters() -> None:
+    """The data have no viscous part, so that c = 0 is better than c = 1/2; the second label contains c."""
+    laws = [("viscous", {"mu": (0.1, 2.0), "c": 0.5}), ("viscous", {"mu": (0.1, 2.0), "c": 0.0})]
+    found = hs.fit_laws(slider("coulomb", mu=0.3), measured(sigma=0.01), laws)
+    assert found.labels == ("viscous (c=0.0)", "viscous")
+    assert found.rows[0].fit.values["f_mu"] == pytest.approx(0.6, abs=0.01)
+
+
 def test_laws_that_cannot_be_fitted_are_refused() -> None:
     """A law twice, a parameter without a guess, a robust loss, and no laws."""
     model, data = slider("coulomb", mu=0.3), measured(sigma=0.01)
