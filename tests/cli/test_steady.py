@@ -68,6 +68,13 @@ tables.mu = { at = [0, 1, 3, 5], values = [0.5, 0.4, 0.3, 0.28] }
 """
 
 
+def test_an_equilibrium_has_a_sentence_instead_of_a_picture(tmp_path: Path, hybridsim: Callable) -> None:
+    """The ball at rest stays where it is put: no disturbance decays."""
+    code, out, err = hybridsim("steady", "bouncing-ball", "--plot", tmp_path / "ball.png")
+    assert code == 0 and "nothing varies in an equilibrium" in err and not (tmp_path / "ball.png").exists()
+    assert "stable       neutrally: some disturbances neither grow nor decay" in out
+
+
 def test_units_are_printed_and_variables_of_tables_are_not(tmp_path: Path, hybridsim: Callable) -> None:
     (tmp_path / "pad.toml").write_text(PAD)
     code, out, err = hybridsim("steady", tmp_path / "pad.toml")

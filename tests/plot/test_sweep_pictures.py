@@ -42,6 +42,14 @@ def test_lines_over_one_parameter() -> None:
     assert sorted(map(tuple, dots)) == sorted((w, v) for w, row in zip(OMEGA, found["all"]) for v in row)
 
 
+def test_states_at_the_end_of_runs_are_dots_without_lines() -> None:
+    """In a sensitive system they jump from point to point."""
+    result = hs.sweep("bouncing-ball", {"e": [0.3, 0.5]}, ["final.h", "maximum.h"], t_span=(0, 1))
+    final, highest = result.plot()
+    assert final.lines[0].get_linewidth() == 0 and final.lines[0].get_marker() == "o"
+    assert highest.lines[0].get_linewidth() > 0
+
+
 def test_of_many_readings_those_that_people_ask_for_first_are_drawn() -> None:
     result = hs.sweep("dfcs", {"omega": [400.0, 500.0]}, "steady")
     drawn = [" ".join(axes.get_ylabel().split()).partition(" [")[0] for axes in sweep_lines(result)]

@@ -16,6 +16,7 @@ from hybridsim.presentation.readable import aligned
 if TYPE_CHECKING:
     from hybridsim.analysis import SteadyState
 
+_NEUTRAL = 1e-6  # 1 minus the size of a multiplier: a smaller decay per period counts as none
 _EXAMPLES = """\
 examples:
   hybridsim steady dfcs
@@ -82,7 +83,9 @@ def execute(args: argparse.Namespace, session: Session) -> int:
         )
     record = found.to_dict(args.harmonics)
     try:  # write files first: printing fails if the reader of the pipe has gone
-        if args.plot:
+        if args.plot and found.kind == "equilibrium":
+            complain(f"nothing varies in an equilibrium: {args.plot} is not written")
+        elif args.plot:
             from hybridsim.plot import save, time_history
 
             save(time_history(found.solution), args.plot)
@@ -122,7 +125,9 @@ def _summary(found: SteadyState, record: dict[str, Any]) -> list[str]:
         lines.append(f"  stable       unknown: {record['no_multipliers']}")
     else:
         sizes = ", ".join(f"{abs(m):.4g}" for m in found.multipliers)
-        lines.append(f"  stable       {'yes' if found.stable else 'no'}")
+        is_neutral = found.stable and any(abs(m) > 1.0 - _NEUTRAL for m in found.multipliers)
+        stable = "neutrally: some disturbances neither grow nor decay" if is_neutral else "yes"
+        lines.append(f"  stable       {stable if found.stable else 'no'}")
         lines.append(
             f"  multipliers  |{sizes}|" if sizes else "  multipliers  only the trivial one along the motion"
         )

@@ -29,6 +29,9 @@ if TYPE_CHECKING:
 
 _MARKED_POINTS = 30  # points of a line up to which each is marked
 _DOT = 5.0  # size of the items of an array, for the first line
+_FINAL = (
+    "final."  # states at the end of runs jump from point to point, for instance in chaos: no line joins them
+)
 _CROWD = 12  # lines up to which the legend names each; of more lines it names some
 _WIDTH, _HEIGHT, _MORE = 7.2, 2.0, 1.1  # inches of a panel, and of the space above and below
 
@@ -88,9 +91,16 @@ def _draw(
             size = _DOT * 0.6**k  # dots under other dots remain visible around them
             panel.plot(dots.ravel(), y.ravel(), ".", color=colour, markersize=max(size, 1.5), label=label)
         else:
-            marker = "o" if len(x) <= _MARKED_POINTS else ""
+            is_joined = not name.startswith(_FINAL)
+            marker = "o" if len(x) <= _MARKED_POINTS or not is_joined else ""
             panel.plot(
-                x[order], y[order], color=colour, marker=marker, markersize=3, linewidth=1.3, label=label
+                x[order],
+                y[order],
+                color=colour,
+                marker=marker,
+                markersize=3,
+                linewidth=1.3 * is_joined,
+                label=label,
             )
     style.dress(panel)
     there = np.isfinite(values).any(axis=-1) if has_items else np.isfinite(values)
