@@ -20,6 +20,7 @@ from hybridsim.solution.event import Event
 
 _MODES = {0: "stick", 1: "slip+", -1: "slip-"}
 _GUARDS = {-1: "", 0: "velocity", 1: "upper", 2: "lower"}
+_SHOWN = 5  # events that the text of a sequence contains
 
 
 class SeriesTrajectory(ArraysTrajectory):
@@ -238,3 +239,9 @@ class _Events(Sequence[Event]):
 
     def __iter__(self) -> Iterator[Event]:
         return (self[i] for i in range(len(self)))
+
+    def __repr__(self) -> str:
+        shown = ", ".join(map(repr, self[:_SHOWN]))
+        return (
+            f"<{len(self)} events: {shown}{', ...' if len(self) > _SHOWN else ''}>" if self else "<0 events>"
+        )

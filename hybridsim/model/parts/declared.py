@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import MISSING, dataclass, field
+from dataclasses import MISSING, Field, dataclass, field, fields
 from inspect import Signature, signature
 from numbers import Complex, Real
 from typing import Any
@@ -45,6 +45,27 @@ class Declared(metaclass=_Refusing):
     """
 
     place: Place | None = field(default=None, compare=False, repr=False, kw_only=True)
+
+    def __init_subclass__(cls, **more: Any) -> None:
+        super().__init_subclass__(**more)
+        if "__repr__" not in cls.__dict__:  # otherwise the class would get one that lists all fields
+            cls.__repr__ = Declared.__repr__  # type: ignore[method-assign]
+
+    def __repr__(self) -> str:
+        """Return the constructor's call, without arguments that have their defaults."""
+        given = [entry.name for entry in fields(self) if entry.repr and not self._is_default(entry)]
+        return (
+            f"{type(self).__name__}({', '.join(f'{name}={_shown(getattr(self, name))}' for name in given)})"
+        )
+
+    def _is_default(self, entry: Field[Any]) -> bool:
+        value = getattr(self, entry.name)
+        default = entry.default_factory() if entry.default_factory is not MISSING else entry.default
+        if isinstance(value, Mapping | tuple) and isinstance(default, Mapping | tuple):
+            return len(value) == len(default) == 0
+        if isinstance(value, Expression):
+            return value.text == str(default)
+        return type(value) is type(default) and bool(value == default)
 
     def _texts(self, *fields: str, known: Iterable[str] = ()) -> None:
         """Check that the fields are strings; None is accepted if it is the default.
@@ -182,3 +203,15 @@ def _as_double(number: Any) -> float:
     if isinstance(number, Complex) and not isinstance(number, Real):
         raise TypeError(number)
     return float(number)
+
+
+def _shown(value: Any) -> str:
+    """Return an argument as it is written in a call: an expression is its text."""
+    if isinstance(value, Expression):
+        return repr(value.text)
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{key!r}: {_shown(entry)}" for key, entry in value.items()) + "}"
+    if isinstance(value, tuple):
+        inner = ", ".join(map(_shown, value))
+        return f"({inner},)" if len(value) == 1 else f"({inner})"
+    return repr(value)
