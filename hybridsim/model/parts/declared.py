@@ -53,10 +53,8 @@ class Declared(metaclass=_Refusing):
 
     def __repr__(self) -> str:
         """Return the constructor's call, without arguments that have their defaults."""
-        given = [entry.name for entry in fields(self) if entry.repr and not self._is_default(entry)]
-        return (
-            f"{type(self).__name__}({', '.join(f'{name}={_shown(getattr(self, name))}' for name in given)})"
-        )
+        declared = [entry.name for entry in fields(self) if entry.repr and not self._is_default(entry)]
+        return f"{type(self).__name__}({', '.join(f'{name}={_shown(getattr(self, name))}' for name in declared)})"
 
     def _is_default(self, entry: Field[Any]) -> bool:
         value = getattr(self, entry.name)
