@@ -41,11 +41,11 @@ def masses_of(system: MechanicalSystem, built: Built) -> np.ndarray:
     return np.asarray(system.M.diagonal())[built.dofs]
 
 
-def with_floor(scale: np.ndarray, masses: np.ndarray) -> np.ndarray:
+def with_floor(scale: np.ndarray, masses: np.ndarray, fraction: float = FLOOR) -> np.ndarray:
     """Return scales (2n,) that are not below a fraction of the largest one of positions, or of velocities.
 
     Coordinates with different units are compared by the square root of their mass times their scale.
     """
     roots = np.sqrt(masses)
-    parts = [np.maximum(part, FLOOR * (roots * part).max() / roots) for part in np.split(scale, 2)]
+    parts = [np.maximum(part, fraction * (roots * part).max() / roots) for part in np.split(scale, 2)]
     return np.concatenate(parts)

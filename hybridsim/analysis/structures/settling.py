@@ -36,7 +36,7 @@ _CLOSER = 0.5  # an extrapolation that does not reduce the change by this factor
 _SQUARED = (0.1, 0.5)  # reduction of the change by an extrapolation that covers about half of the distance
 _TWICE = 0.9  # additional length of the next extrapolation, which must not go beyond the limit
 _NEARLY = 1e4  # multiple of the tolerance: below it, the motion may be about to repeat
-_RESTS = 1e-12  # a smaller range relative to the size is rest
+_RESTS = 1e-12  # a smaller range relative to the largest size of its kind is rest
 
 
 class Settled(NamedTuple):
@@ -141,7 +141,8 @@ class Settling:
         scale = with_floor(np.maximum(half, FLOOR * largest), self.map.masses)
         last = Point(self.map.x, np.zeros(0), {}, self.map.modes)
         times = self.map.period * np.arange(len(self._states))
-        return Passings(times, np.array(self._states), scale, last), bool((half <= _RESTS * largest).all())
+        rests = half <= _RESTS * with_floor(largest, self.map.masses, 1.0)
+        return Passings(times, np.array(self._states), scale, last), bool(rests.all())
 
     def _extrapolate(self, scale: np.ndarray) -> None:
         """Put the limit of the periods with equal events in place of the states."""
