@@ -65,6 +65,16 @@ def test_a_page_prints_what_it_says(page: str, fewest: int, tmp_path: Path) -> N
     assert done.stdout.splitlines() == said
 
 
+def test_the_page_on_measurements_prints_what_it_says(tmp_path: Path) -> None:
+    """The page also prints two tables, of the fit and of the laws."""
+    code = "\n".join(blocks(ROOT / "docs" / "how-to" / "fit-measurements.md", "python"))
+    done = fresh.run(code, folder=tmp_path, is_strict=True)
+    assert done.returncode == 0, done.stderr
+    said = re.findall(r"^ *print\(.*\)  # (.+)$", code, re.MULTILINE)
+    assert len(said) == 3
+    assert [line for line in done.stdout.splitlines() if line in said] == said
+
+
 def test_the_model_shown_is_the_model_shipped() -> None:
     (shown,) = blocks(README, "toml")
     model, shipped = hs.Model.from_toml(shown), hs.load("dfcs")
