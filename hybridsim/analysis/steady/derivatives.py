@@ -38,6 +38,7 @@ from hybridsim.solution import Solution
 _NEUTRAL = 1e-6  # a multiplier that is closer to 1 leaves the motion undetermined
 _TOUCHES = 1e-9  # of its largest value: a guard with a smaller minimum touches zero
 _ASIDE = 1e-2  # of a segment: a minimum closer to an end belongs to the event there
+_ONCE = "use an output that has its extreme value once in a period, and no jump at the start of the period"
 _ALIKE = 1e-9  # relative changes of the periods of the forcing that differ by less are equal
 
 
@@ -124,7 +125,7 @@ class SteadySensitivities(Readable):
         # With forcing, the end of the period is its start one period later, for which an extreme value counts once.
         # Without, the start is on a plane across the flow, and an event there moves by an unknown time.
         end_shift = None if self._is_free else self.period_by_parameter
-        readings = Readings(over, solution.t_start, solution.t_end, self.parameters, end_shift)
+        readings = Readings(over, solution.t_start, solution.t_end, self.parameters, end_shift, _ONCE)
         title, length = f"{reading} of {' * '.join(names)}", solution.t_end - solution.t_start
         if reading not in ("integral", "mean"):
             return SteadyReading(title, *readings.of(reading, names))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import mpmath as mp
 import numpy as np
@@ -206,6 +207,16 @@ def test_a_graze_is_refused() -> None:
     wall = hs.Component("wall", modes, initial="below")
     with pytest.raises(hs.UsageError, match=r"hit of wall .*touches zero without an event"):
         hs.steady_state(forced(components=[wall])).sensitivities(["F"])
+
+
+def test_two_equal_extreme_values_are_refused() -> None:
+    """(x - b/k)^2 is largest at both ends of the swing, and a change of the level in it makes one of them larger."""
+    model = forced(outputs=[hs.Output("square", "(x - level)**2")])
+    model = replace(model, parameters=(*model.parameters, hs.Parameter("level", FORCED["b"] / FORCED["k"])))
+    with pytest.raises(
+        hs.UsageError, match=r"same maximum(?s:.)*use an output that has its extreme value once"
+    ):
+        hs.steady_state(model).sensitivities(["level"]).of("maximum", "square")
 
 
 def test_motions_and_names_without_derivatives_are_refused() -> None:

@@ -83,6 +83,7 @@ class Readings:
     ----------
     changes : names of the directions.
     end_shift : derivatives (M,) of `last`, by default zero. They count for an extreme value at this end.
+    remedy : replaces the remedies of errors that use a part of the run.
     """
 
     def __init__(
@@ -92,8 +93,9 @@ class Readings:
         last: float,
         changes: Sequence[str],
         end_shift: np.ndarray | None = None,
+        remedy: str = "",
     ) -> None:
-        self._found, self._changes = found, changes
+        self._found, self._changes, self._remedy = found, changes, remedy
         self._end_shift = np.zeros(found.width) if end_shift is None else end_shift
         self._low, self._high = min(first, last), max(first, last)
         self._sign = 1.0 if last >= first else -1.0
@@ -138,7 +140,7 @@ class Readings:
                 raise UsageError(
                     f"{extremes.name} has the same {kind} {place.value:.9g} at {times}, and a change "
                     f"of {by} makes the two values different, so there is no derivative",
-                    remedy="use a part of the run with one of these times, t_span=(a, b)",
+                    remedy=self._remedy or "use a part of the run with one of these times, t_span=(a, b)",
                 )
         return points[0].value, slopes[0] + 0.0 * slopes.sum(axis=0)  # NaN if it is NaN at one of the points
 
@@ -154,7 +156,7 @@ class Readings:
                 raise UsageError(
                     f"{extremes.name} is largest or least at an event at t = {self._time(place):.9g}, an end of the "
                     f"time span; a change of {by} moves the event, so there is no derivative",
-                    remedy="use a part of the run that ends earlier or later, t_span=(a, b)",
+                    remedy=self._remedy or "use a part of the run that ends earlier or later, t_span=(a, b)",
                 )
             if (place.number, place.s) == extremes.limits[1]:
                 shift = shift + self._end_shift
@@ -214,7 +216,7 @@ class Readings:
                 raise UsageError(
                     f"{' * '.join(names)} jumps at t = {t:.9g}, an end of the time span; a change of {by} "
                     "moves the jump, so the integral has no derivative",
-                    remedy="use a part of the run that ends earlier or later, t_span=(a, b)",
+                    remedy=self._remedy or "use a part of the run that ends earlier or later, t_span=(a, b)",
                 )
             total += jump * shift
         return total
