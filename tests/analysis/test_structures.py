@@ -164,6 +164,29 @@ def test_a_structure_that_only_creeps_by_rounding_rests(
     assert steady.amplitude["q2"] <= 1e-12 * unit
 
 
+@pytest.mark.parametrize(("damping", "rests"), [(0.12, False), (0.134, False), (0.15, True)])
+def test_a_block_on_a_belt_rests_only_if_its_damping_exceeds_the_slope_of_friction(
+    damping: float, rests: bool
+) -> None:
+    """At rest the force falls with the speed of the belt, by 0.138 per unit; the other block always sticks."""
+    mu_s, mu_k, v_s, speed = 0.4, 0.2, 0.3, 0.5
+    law = {"mu_s": mu_s, "mu_k": mu_k, "v_s": v_s}
+    system = hs.MechanicalSystem(
+        [1.0, 1.0],
+        [0.0, damping],
+        [1.0, 1.0],
+        [hs.Harmonic(1.0, sin=0.3), 0.0],
+        [
+            hs.MechanicalContact("f1", {0: 1.0}, 1.0, "coulomb", {"mu": 0.5}),
+            hs.MechanicalContact("f2", {1: 1.0}, 1.0, "stribeck", law, base=speed),
+        ],
+    )
+    bell = math.exp(-((speed / v_s) ** 2))
+    assert (damping > 2.0 * (mu_s - mu_k) * bell * speed / v_s**2) is rests
+    steady = hs.steady_state(system, x0={"q2": mu_k + (mu_s - mu_k) * bell + 1e-3}, max_periods=300)
+    assert (steady.kind == "equilibrium") is rests
+
+
 def test_a_structure_without_contacts_has_the_linear_response() -> None:
     """The amplitude is that of the complex stiffness; the period is common to both forces."""
     M, C, K = np.diag([1.0, 2.0]), np.array([[0.2, -0.1], [-0.1, 0.3]]), np.array([[3.0, -1.0], [-1.0, 2.0]])

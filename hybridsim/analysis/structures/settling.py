@@ -106,8 +106,8 @@ class Settling:
             passings, rests = self._passings()
             if not self._end_trial(passings.scale):
                 continue
-            multiple = self._multiple(passings)
-            if rests or (multiple is not None and self._attracts(passings, multiple)):
+            multiple = 1 if rests else self._multiple(passings)
+            if multiple is not None and self._attracts(passings, multiple):
                 return Settled(passings, multiple, rests, self.extrapolations)
             if self.map.periods >= self.max_periods:
                 return Settled(passings, None, False, self.extrapolations)
