@@ -67,7 +67,6 @@ def maps(case: Case, found: dict[str, Map], star: tuple[float, str], path: Path)
             color="#b00000",
             ms=4,
             mew=1.2,
-            clip_on=False,
             label="wrong number of stops",
         )
         panel.plot([], [], "-", color="black", lw=2.4, label="error 1 %")

@@ -95,6 +95,10 @@ class Clip:
             )
             self._curves = list(grid[:, 0])
             time_history(solution, names, t_span=(window.t0, window.t1), axes=self._curves)
+            for axes in self._curves:  # a curve is too low for a title besides its symbol
+                *_, symbol = axes.get_ylabel().split("\n")
+                if not symbol.startswith("["):
+                    axes.set_ylabel(symbol, fontsize=9)
             below[0].align_ylabels(self._curves)
             for axes in self._curves:
                 axes.set_title("", loc="left")
