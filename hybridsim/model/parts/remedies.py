@@ -36,6 +36,11 @@ def remedy_for_parameter(model: Any, name: str, others: tuple[str, ...] = ()) ->
     for signal in model.inputs:
         if name == signal.name:
             return f"'{name}' is an input of kind '{signal.kind}'; change it in the model"
+        if signal.kind == "table" and name.startswith(f"{signal.name}["):
+            return (
+                f"change the input '{signal.name}' in the model; hs.sensitivities accepts its values "
+                f"{signal.name}[0] to {signal.name}[{len(signal.values) - 1}]"
+            )
     return nearest(name, [*names, *others], kind="parameters and states" if others else "parameters")
 
 

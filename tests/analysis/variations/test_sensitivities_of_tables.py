@@ -99,3 +99,8 @@ def test_values_that_are_not_there_are_refused() -> None:
         hs.sensitivities(run, ["u[4]"])
     with pytest.raises(hs.UsageError, match=r"no parameter 'w\[0\]'"):
         hs.sensitivities(run, ["w[0]"])
+    listed = r"hs.sensitivities accepts its values u\[0\] to u\[3\]"
+    with pytest.raises(hs.UsageError, match=listed):
+        hs.sensitivities(run, ["u[-1]"])
+    with pytest.raises(hs.UsageError, match=listed):
+        hs.fit(driven("linear"), {"t": TIMES, "x": VALUES}, {"u[1]": (0, 3)})
