@@ -16,6 +16,7 @@ from hybridsim.cli.progress import Progress
 from hybridsim.cli.session import Session
 from hybridsim.errors import RunInterrupted, SimulationError, UsageError
 from hybridsim.files import fields_of
+from hybridsim.presentation.readable import cost_text
 
 if TYPE_CHECKING:
     from hybridsim.model.parts.model import Model
@@ -228,7 +229,7 @@ def summary(solution: Solution) -> list[str]:
     """Return the lines of the summary of a run."""
     from hybridsim.solution.event import counted_kind
 
-    model, stats = solution.model, solution.stats
+    model = solution.model
     has_events = _has_events(solution)
     found = (
         {kind: n for kind, n in solution._of_model.kinds().items() if kind != "corner"} if has_events else {}
@@ -258,10 +259,7 @@ def summary(solution: Solution) -> list[str]:
         )
         lines.append(f"  time         {solution.t_start:g} to {solution.t_end:.9g}")
         lines.append(f"  final state  {final}")
-    lines.append(
-        f"  cost         {stats['steps']} steps ({stats['rejected']} rejected), "
-        f"{stats['rhs_evaluations']} right-hand sides, {stats['wall_time']:.3g} s"
-    )
+    lines.append(f"  cost         {cost_text(solution.stats)}")
     return lines
 
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from html import escape
+from typing import Any
 
 
 class Readable:
@@ -26,3 +27,12 @@ def aligned(rows: Iterable[Sequence[str]], indent: str = "") -> list[str]:
 def in_numbers(values: Iterable[complex]) -> str:
     """Return real or complex numbers as text with six digits each."""
     return "[" + ", ".join(f"{value:.6g}" for value in values) + "]"
+
+
+def cost_text(stats: Mapping[str, Any]) -> str:
+    """Return the cost of a run; a closed form evaluates no right-hand sides, and rejects no steps."""
+    rejected = f" ({stats['rejected']} rejected)" if stats["rejected"] else ""
+    parts = [f"{stats['steps']} steps{rejected}"]
+    if stats["rhs_evaluations"]:
+        parts.append(f"{stats['rhs_evaluations']} right-hand sides")
+    return ", ".join([*parts, f"{stats['wall_time']:.3g} s"])

@@ -11,6 +11,7 @@ import numpy as np
 from hybridsim.engine.record.time_lookup import Frame, locate_times
 from hybridsim.expr.evaluate import evaluate
 from hybridsim.expr.grammar import TIME
+from hybridsim.presentation.readable import cost_text
 from hybridsim.solution.by_name import ByName
 from hybridsim.solution.event import ModeInterval, counted_kind
 from hybridsim.solution.files.tabulated import SegmentConstants, at_steps, constants_of, tabulated
@@ -286,7 +287,7 @@ class ModelTrajectory(ModelEvents):
     def summary(self) -> list[str]:
         """Return the end state, the events by kind, and the cost."""
         counted = ", ".join(counted_kind(*found) for found in sorted(self.kinds().items()))
-        lines, stats = [], self.stats
+        lines = []
         if self.segments:
             last = self.segments[-1].x[-1]
             final = ", ".join(f"{n} = {v:.9g}" for n, v in zip(self.names, last, strict=True))
@@ -294,5 +295,5 @@ class ModelTrajectory(ModelEvents):
         return [
             *lines,
             f"  events: {'not kept' if self.save == 'nothing' else counted or 'none'}",
-            f"  cost: {stats['steps']} steps, {stats['rhs_evaluations']} right-hand sides, {stats['wall_time']:.3g} s",
+            f"  cost: {cost_text(self.stats)}",
         ]

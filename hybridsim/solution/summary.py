@@ -6,6 +6,7 @@ from html import escape
 
 from hybridsim.errors import printable
 from hybridsim.presentation.notebook import run_html
+from hybridsim.presentation.readable import cost_text
 from hybridsim.solution.model_trajectory import ModelTrajectory
 from hybridsim.solution.run_trajectory import RunTrajectory
 
@@ -25,11 +26,10 @@ def in_html(run: RunTrajectory, success: bool) -> str:
     """Return a summary as HTML: status, a strip of modes for each component, events and warnings."""
     if not isinstance(run, ModelTrajectory):
         return f"<pre>{escape(as_text(run))}</pre>"
-    stats, model = run.stats, run.model
+    model = run.model
     head = {
         run.status: f"{model.title or model.name}, by {run.integrator}",
-        "cost": f"{stats['steps']} steps ({stats['rejected']} rejected), "
-        f"{stats['rhs_evaluations']} right-hand sides, {stats['wall_time']:.3g} s",
+        "cost": cost_text(run.stats),
     }
     head |= {} if success else {"message": run.message}
     span = (run.t_start, run.t_end) if run.segments else None
