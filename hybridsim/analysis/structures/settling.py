@@ -150,8 +150,7 @@ class Settling:
         if not self._may_extrapolate or len(pairs) < _FEWEST or self._waited < self._wait:
             return
         before, after = (np.array(part) for part in zip(*pairs, strict=True))
-        last = after[-1] - before[-1]
-        change = relative(last, scale)
+        change = relative(after[-1] - before[-1], scale)
         for count in _COUNTS:  # the latest periods show the map where the states are now
             limit, expected = limit_of(before[-count:], after[-count:], scale)
             if expected < _GAIN * change or count >= len(before):
