@@ -48,7 +48,7 @@ def charts(
             folder / "speed-events.png",
             "time, events alone",
             "error of event times / T",
-            "not drawn: wrong sequence of events",
+            "",
             lambda line: (line.events.middle, line.errors.times) if line.events else None,
         ),
         _picture(
@@ -74,7 +74,7 @@ def _picture(
 ) -> Path:
     columns = min(len(found), 2)
     rows = math.ceil(len(found) / columns)
-    figure = style.figure(5.75 * columns, 3.4 * rows + 0.5)
+    figure = style.figure(min(5.75 * columns, style.BROAD), 3.2 * rows + 0.5)
     panels = figure.subplots(rows, columns, squeeze=False).ravel()
     drawn: list[tuple[Any, list[tuple[float, float, str, str]]]] = []
     for panel, (name, lines) in zip(panels, found.items()):
@@ -133,9 +133,9 @@ def _picture(
         label=wrong,
     )
     figure.legend(
-        handles=[*handles, hollow],
+        handles=[*handles, hollow] if wrong else handles,
         loc="outside upper left",
-        ncols=5 if columns > 1 else 2,
+        ncols=3 if columns > 1 else 2,
         frameon=False,
         fontsize=9,
     )
