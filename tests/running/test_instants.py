@@ -6,6 +6,7 @@ import math
 import random
 from collections.abc import Callable
 from fractions import Fraction
+from functools import cache
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from hybridsim.testing.measuring import load
 LOCATING = ("dop853", "tsit5", "rodas5p", "exact", "taylor", "scipy-dop853", "cvode-adams", "cvode-bdf")
 
 
+@cache  # several methods run each model
 def model(text: str) -> hs.Model:
     return hs.Model.from_toml('schema = 1\nname = "scene"\n' + text)
 

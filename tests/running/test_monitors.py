@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 
 import pytest
 
@@ -12,6 +13,7 @@ ADAPTIVE = ("dop853", "tsit5", "rodas5p", "exact", "taylor", "scipy-dop853", "cv
 ACTIONS = ("record", "terminate", "reset")
 
 
+@cache  # several methods run each model
 def model(text: str) -> hs.Model:
     return hs.Model.from_toml('schema = 1\nname = "scene"\n' + text)
 

@@ -33,7 +33,7 @@ def suite() -> hs.SuiteComparison:
         rtols=[1e-4, 1e-8, 1e-12],
         steps=[1200],
         repeat=1,
-        budget=200.0,
+        budget=2000.0,  # never reached, also on a busy machine
     )
 
 
