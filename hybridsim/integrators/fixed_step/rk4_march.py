@@ -44,8 +44,10 @@ class Rk4March(March):
         rows = tuple(tuple(row) for row in self._table.tolist())
         sizes = (system.n, len(system.automata), system.guard_count, rows)
         code = StepCode(*sizes, settings.rule, settings.every_stage, settings.zeroed, system.layout.pin_at)
+        # the addresses are valid as long as this object exists: the cache may give it up during a run
+        functions, self._functions_in_memory = step_functions(cast(ModuleType, system.code.module), code)
         self._addresses = (
-            *step_functions(cast(ModuleType, system.code.module), code)[0],
+            *functions,
             *(system.address(name) for name in ("guards", "monitors", "project", "surfaces")),
         )
         self._settings = (float(settings.step), settings.halvings, float(settings.eps))
