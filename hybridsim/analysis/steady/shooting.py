@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hybridsim.analysis.steady.motion import Motion, Point, point_at_end
+from hybridsim.analysis.steady.on_guard import lies_on_a_guard
 from hybridsim.analysis.steady.settling import relative
 from hybridsim.analysis.variations.off_zero import rates_of
 from hybridsim.analysis.variations.sensitivities import derivatives
@@ -32,7 +33,7 @@ class Orbit:
     period : time after which it repeats; multiple: the same in periods of the forcing or passages of the section.
     residual : largest change of a state over the period, relative to its scale.
     steps : number of steps of Newton's method.
-    attracts : whether all multipliers are inside the unit circle.
+    attracts : whether all multipliers are inside the unit circle, and the orbit is inside its modes.
     """
 
     start: Point
@@ -75,7 +76,8 @@ def shoot(motion: Motion, start: Orbit, scale: np.ndarray, section: int | None, 
         best = replace(orbit, residual=residual, steps=count, attracts=_attracts(matrix, rates))
         # The remaining error is the step itself.
         if residual <= tol and relative(move, scale) <= tol and abs(longer) <= tol * orbit.period:
-            return replace(best, converged=True)
+            attracts = best.attracts and not lies_on_a_guard(solution, scale)
+            return replace(best, converged=True, attracts=attracts)
         orbit = replace(orbit, start=orbit.start.moved(move), period=orbit.period + longer)
         if not orbit.period > 0.0:
             break
