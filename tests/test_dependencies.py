@@ -24,7 +24,6 @@ NOT_IMPORTED = {
     "pytest-randomly": "the order of the tests",
     "ruff": "a program",
     "mypy": "a program",
-    "sphinx": "a program",
     "myst-parser": "an extension of Sphinx that docs/conf.py names",
     "pydata-sphinx-theme": "the theme that docs/conf.py names",
 }
