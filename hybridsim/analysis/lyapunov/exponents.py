@@ -58,8 +58,12 @@ class LyapunovExponents(Readable):
     def dimension(self) -> float:
         """The Kaplan-Yorke dimension of the attractor; NaN if too few exponents are known for it.
 
-        It is j + (l_1 + ... + l_j)/|l_(j+1)| with the largest j of which the sum is not negative
-        (J. L. Kaplan and J. A. Yorke, Lecture Notes in Mathematics 730 (1979) 204, doi:10.1007/BFb0064319).
+        ::
+
+            D = j + (l_1 + ... + l_j)/abs(l_(j+1))
+
+        j is the largest number of exponents whose sum is not negative (J. L. Kaplan and J. A. Yorke, Lecture Notes in
+        Mathematics 730 (1979) 204, doi:10.1007/BFb0064319).
         """
         sums = np.concatenate([[0.0], np.cumsum(self.values)])
         j = int(np.flatnonzero(sums >= 0.0)[-1])
