@@ -40,7 +40,7 @@ class Growth:
         generic = np.random.default_rng(0).standard_normal((len(scale), count))
         generic[:, 0] = 1.0
         self.directions = np.linalg.qr(generic)[0]
-        self.count = count
+        self.count, self.numbers = count, np.arange(count)  # the numbers of the directions that are followed
 
     def over(self, duration: float, halvings: int = _HALVINGS) -> np.ndarray:
         """Follow the motion for a duration, and return the logarithm (M,) of each direction's growth.
@@ -49,22 +49,26 @@ class Growth:
         duration, has the logarithm -inf and is not followed any longer.
         """
         start, before = self.point, self.directions
-        factors = self._factors(duration)
-        is_resolved = factors > _RESOLVED * factors.max(initial=0.0)
+        change = self._change(duration)
+        self.directions, factors, is_resolved = _orthogonal(change)
         if halvings and not (is_resolved.all() and factors.max(initial=0.0) < _LARGEST):
             self.point, self.directions = start, before
             return self.over(0.5 * duration, halvings - 1) + self.over(0.5 * duration, halvings - 1)
-        self.directions = self.directions[:, is_resolved]
-        lost = np.full(self.count - is_resolved.sum(), -np.inf)
-        return np.concatenate([np.log(factors[is_resolved]), lost])
+        while not is_resolved.all():  # a direction that others contain is left out, and then the next one
+            others = np.arange(len(factors)) != np.argmin(is_resolved)
+            change, self.numbers = change[:, others], self.numbers[others]
+            self.directions, factors, is_resolved = _orthogonal(change)
+        logarithms = np.full(self.count, -np.inf)
+        logarithms[self.numbers] = np.log(factors)
+        return logarithms
 
-    def _factors(self, duration: float) -> np.ndarray:
-        """Follow the motion for a duration, and return the factor by which each direction has grown."""
+    def _change(self, duration: float) -> np.ndarray:
+        """Follow the motion for a duration, and return what the directions have become."""
         n, motion, before = len(self.point.x), self.motion, self.directions * self.scale
         solution = motion.run(self.point, duration)
         self.point = replace(point_at_end(solution), at=self.point.at + duration)
         if not before.shape[1]:
-            return np.zeros(0)
+            return before
         refuse(solution)
         constant = np.zeros((len(motion.model.parameters), before.shape[1]))
         carried = Carrier(solution).carry(Directions(before[:n], before[n:], constant))
@@ -73,8 +77,14 @@ class Growth:
             raise SimulationError(
                 f"the motion has no derivative between t = {solution.t_start:.9g} and t = {solution.t_end:.9g}"
             )
-        self.directions, triangle = np.linalg.qr(change)
-        return np.abs(np.diag(triangle))
+        return np.asarray(change)
+
+
+def _orthogonal(change: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return orthogonal directions, the factor of each, and whether it can be told from rounding errors."""
+    directions, triangle = np.linalg.qr(change)
+    factors = np.abs(np.diag(triangle))
+    return directions, factors, factors > _RESOLVED * factors.max(initial=0.0)
 
 
 def largest_exponents(motion: Motion, start: Point, period: float) -> tuple[float, float]:

@@ -16,6 +16,8 @@ _ZERO = 1e-6  # of the change of a guard by the size of the motion
 def lies_on_a_guard(solution: Solution, scale: np.ndarray) -> bool:
     """Return whether a guard that is active all the time is zero all the time, relative to the size of the motion.
 
+    A guard that no state changes does not count: its mode cannot change.
+
     Parameters
     ----------
     solution : one period of the orbit.
@@ -33,5 +35,5 @@ def lies_on_a_guard(solution: Solution, scale: np.ndarray) -> bool:
             points[1 + np.arange(len(chosen)), chosen] += scale[chosen]
             values = system.rows("guards", count, np.full(len(points), s), points, segment.p, segment.z)
             size = np.abs(values[1:] - values[0]).max(axis=0, initial=0.0)
-            is_zero &= np.abs(values[0]) <= _ZERO * size
+            is_zero &= (size > 0.0) & (np.abs(values[0]) <= _ZERO * size)
     return bool(is_zero.any())

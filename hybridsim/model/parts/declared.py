@@ -49,7 +49,7 @@ class Declared(metaclass=_Refusing):
     def __init_subclass__(cls, **more: Any) -> None:
         super().__init_subclass__(**more)
         if "__repr__" not in cls.__dict__:  # otherwise the class would get one that lists all fields
-            cls.__repr__ = Declared.__repr__  # type: ignore[method-assign]
+            cls.__repr__ = Declared.__repr__  # type: ignore[method-assign]  # what a method of the class would be
 
     def __repr__(self) -> str:
         """Return the constructor's call, without arguments that have their defaults."""

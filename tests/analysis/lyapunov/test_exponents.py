@@ -50,7 +50,7 @@ def test_linear_modes_far_apart(c: float) -> None:
 
 
 def test_forcing_goes_on_from_part_to_part() -> None:
-    """The divergence is (t - 50)/50 - 0.2: a time that begins anew in each part would give another sum."""
+    """The sum of the exponents is the mean divergence of the flow, (t - 50)/50 - 0.2, over the true times."""
     model = hs.Model(
         "growing",
         states=(
@@ -94,6 +94,17 @@ def test_stick_reduces_a_change_to_nothing() -> None:
     assert found.errors[0] < 0.05 and math.isnan(found.errors[1])
 
 
+def test_what_decays_beside_a_block_that_sticks_is_not_lost() -> None:
+    """A block sticks from t = 20 on, and loses one direction. Beside it y decays by exp(-3 t)."""
+    model = hs.Model(
+        "beside",
+        states=(hs.State("x", 0.0, "v"), hs.State("v", 2.0, "-f"), hs.State("y", 1.0, "-3*y")),
+        contacts=(hs.Contact("f", "v", 1.0, "coulomb", arguments={"mu": 0.1}),),
+    )
+    found = hs.lyapunov_exponents(model, 40, transient=2)
+    assert found.values[:2] == pytest.approx([0.0, -3.0], abs=0.1) and found.values[2] == -math.inf
+
+
 def test_progress_is_a_share_that_grows() -> None:
     shares: list[float] = []
     hs.lyapunov_exponents(oscillator(0.1), 20, progress=shares.append)
@@ -111,14 +122,14 @@ def test_progress_is_a_share_that_grows() -> None:
 )
 def test_bad_arguments_are_named(arguments: dict[str, object], message: str) -> None:
     with pytest.raises(hs.UsageError, match=message):
-        hs.lyapunov_exponents(oscillator(0.1), **arguments)  # type: ignore[arg-type]
+        hs.lyapunov_exponents(oscillator(0.1), **arguments)  # type: ignore[arg-type]  # what is refused
 
 
 def test_what_has_no_exponents_is_named() -> None:
     with pytest.raises(hs.UsageError, match="Python functions"):
         hs.lyapunov_exponents(hs.Model("m", states={"x": 1.0}, flow=lambda t, x, p: (-x[0],)), 1.0)
     with pytest.raises(hs.UsageError, match=r"to_model\(\)"):
-        hs.lyapunov_exponents(hs.chain_on_belt(2), 1.0)  # type: ignore[arg-type]
+        hs.lyapunov_exponents(hs.chain_on_belt(2), 1.0)  # type: ignore[arg-type]  # what is refused
     ends = hs.Model(
         "ends",
         states=(hs.State("x", 1.0, "1"),),
