@@ -10,7 +10,6 @@ from hybridsim.engine.linear.matrix_template import template_of
 from hybridsim.engine.linear.tables import (
     LinearTables,
     of_matrices,
-    usable_modes,
 )
 from hybridsim.engine.linear.units import horizon_class
 from hybridsim.engine.native.struct_pack import packed
@@ -102,11 +101,8 @@ def ensemble_tables(
 def _group(
     system: System, template: Any, numbers: np.ndarray, registers: np.ndarray, horizon: float
 ) -> EnsembleTables | None:
-    A, rows = template.matrices(registers)
-    modes = A.shape[1]
-    count = A.shape[0] * modes
-    A, rows = (part.reshape(count, *part.shape[2:]) for part in (A, rows))  # stacked along the first axis
-    usable = usable_modes(A, rows, system.n)
+    A, rows, usable = template.matrices(registers)
+    modes = len(A) // len(registers)
     known = usable.reshape(-1, modes).any(axis=1)
     numbers, registers = numbers[known], registers[known]
     A, rows, usable = (part[np.repeat(known, modes)] for part in (A, rows, usable))

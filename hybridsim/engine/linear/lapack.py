@@ -13,20 +13,24 @@ _eig, _inv = getattr(_umath, "eig", None), getattr(_umath, "inv", None)
 
 
 def eigenvectors(matrices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return complex eigenvalues (K, m) and eigenvectors (K, m, m) of real matrices (K, m, m)."""
+    """Return complex eigenvalues (K, m) and eigenvectors (K, m, m) of real matrices (K, m, m).
+
+    Without convergence the results are NaN. The caller ignores floating-point errors.
+    """
     if _eig is None:
         values, vectors = np.linalg.eig(matrices)
         return values.astype(complex, copy=False), vectors.astype(complex, copy=False)
-    with np.errstate(all="ignore"):  # without convergence the results are NaN
-        values, vectors = _eig(matrices, signature="d->DD")
-    return values, vectors
+    found: tuple[np.ndarray, np.ndarray] = _eig(matrices, signature="d->DD")
+    return found
 
 
 def inverse_matrices(matrices: np.ndarray) -> np.ndarray:
-    """Return inverses of real matrices (K, m, m); the inverse of a singular matrix is NaN or infinite."""
+    """Return inverses of real matrices (K, m, m); the inverse of a singular matrix is NaN or infinite.
+
+    The caller ignores floating-point errors.
+    """
     if _inv is not None:
-        with np.errstate(all="ignore"):
-            return np.asarray(_inv(matrices, signature="d->d"))
+        return np.asarray(_inv(matrices, signature="d->d"))
     try:
         return np.linalg.inv(matrices)
     except np.linalg.LinAlgError:  # one of them is singular

@@ -11,6 +11,7 @@ import numpy as np
 from hybridsim.engine.linear.form import Atoms, Form, Monomial
 from hybridsim.engine.linear.modes import LinearMode, NoMode, modes_of, single_changes
 from hybridsim.engine.linear.recipe import Numbers, Recipe
+from hybridsim.engine.linear.table_rows import leave_out
 from hybridsim.engine.native.kernels import Precompiled, kernel
 from hybridsim.engine.system.per_structure import per_structure
 from hybridsim.engine.system.system import System
@@ -55,11 +56,11 @@ class MatrixTemplate:
             found = [(row * size + place[k], numbers.place(w)) for row, form in rows for k, w in form.items()]
             return np.array(found, dtype=np.int64).reshape(-1, 2).T.copy()
 
-        self._shapes = (len(met), size, size), (len(met), guards, size)
+        self._n, self._shape = n, (len(met), guards, size)
         self._monomials: list[Monomial] = monomials
         first, self._flow, self._guards = 0, entries(()), entries(())
         if begun is not None and begun._monomials == monomials:
-            first, self._flow, self._guards = begun._shapes[0][0], begun._flow, begun._guards
+            first, self._flow, self._guards = begun._shape[0], begun._flow, begun._guards
         new = [(k, modes[k]) for k in range(first, len(met))]
         flow = entries(
             (k * size + row, form) for k, mode in new for row, form in [*enumerate(mode.rates), *motion]
@@ -98,16 +99,16 @@ class MatrixTemplate:
         read = modes_of(system, self._atoms, single_changes(system), self._numbers.inputs)
         return {(), *(m for mode in read for m in mode.monomials())}
 
-    def matrices(self, registers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return A (K, m, m) of the flows y' = A y, and the rows (K, G, m) of the guards.
+    def matrices(self, registers: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return A (K, m, m) of the flows y' = A y, the rows (K, G, m) of the guards, and a mask of the usable modes.
 
-        registers: (R,), or (points, R) for as many of each.
+        registers (points, R): the matrices of all points are stacked along the first axis. See `leave_out`.
         """
-        lead, points = registers.shape[:-1], registers if registers.ndim > 1 else registers[None]
-        A, rows = (np.zeros(lead + shape) for shape in self._shapes)
-        for matrix, entries in ((A, self._flow), (rows, self._guards)):
-            _put(points, entries, matrix.reshape(-1))
-        return A, rows
+        (count, guards, size), points = self._shape, len(registers)
+        A, rows = np.zeros((points * count, size, size)), np.zeros((points * count, guards, size))
+        usable = np.empty(points * count, dtype=np.bool_)
+        _put_entries(registers, self._flow, self._guards, self._n, A, rows, usable)
+        return A, rows, usable
 
     def atoms(self, registers: np.ndarray) -> tuple[np.ndarray, ...]:
         """Return the basic functions of time and their monomials as arrays, in the order of `LinearTables`.
@@ -120,15 +121,17 @@ class MatrixTemplate:
 
 
 @kernel
-def put_entries(registers: Any, entries: Any, out: Any) -> None:
-    """Write the entries of some matrices, one after the other, for each row of registers."""
-    size = out.shape[0] // registers.shape[0]
-    for point in range(registers.shape[0]):
-        for j in range(entries.shape[1]):
-            out[point * size + entries[0, j]] = registers[point, entries[1, j]]
+def put_entries(registers: Any, flow: Any, guards: Any, n: int, A: Any, rows: Any, usable: Any) -> None:
+    """Write the matrices of all points and the mask of usable modes; A and rows are zero."""
+    for entries, out in ((flow, A.reshape(-1)), (guards, rows.reshape(-1))):
+        size = out.shape[0] // registers.shape[0]
+        for point in range(registers.shape[0]):
+            for j in range(entries.shape[1]):
+                out[point * size + entries[0, j]] = registers[point, entries[1, j]]
+    leave_out(A, rows, n, usable)
 
 
-_put = Precompiled(put_entries)
+_put_entries = Precompiled(put_entries)
 
 
 def _factors(monomials: Sequence[Sequence[int]], one: int) -> np.ndarray:

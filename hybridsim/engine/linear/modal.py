@@ -107,9 +107,10 @@ def modals(
     balanced, basis = np.empty(A.shape), np.empty(A.shape)
     is_diagonal, are_right = np.empty(len(A), dtype=np.bool_), np.empty(len(A), dtype=np.bool_)
     _balance(A, horizon, basis, scales, balanced)
-    values, vectors = eigenvectors(balanced)
-    _real_columns(values, vectors, basis)
-    inverses, others = inverse_matrices(basis), {}
+    with np.errstate(all="ignore"):
+        values, vectors = eigenvectors(balanced)
+        _real_columns(values, vectors, basis)
+        inverses, others = inverse_matrices(basis), {}
     most = _check_eigenvectors(balanced, values, vectors, inverses, horizon, counts, is_diagonal, are_right)
     if most < 0:
         for k in np.flatnonzero(~is_diagonal).tolist():

@@ -110,57 +110,64 @@ class Traced(float):
     __bool__ = __lt__ = __le__ = __gt__ = __ge__ = None  # type: ignore[assignment]  # they raise TypeError
 
 
+@kernel
+def repeat(rows: Any, start: Any, compared: Any, inputs: Any, registers: Any) -> bool:
+    """Repeat the recorded operations for some inputs, and return whether all comparisons have the recorded results.
+
+    rows, start (R, 1), compared: the parts of a `Recipe`. registers (R, 1) receives all results.
+    """
+    for r in range(start.shape[0]):
+        registers[r, 0] = start[r, 0]
+    for j in range(inputs.shape[0]):
+        registers[j, 0] = inputs[j]
+    advance(rows, registers, 0)
+    for i in range(compared.shape[0]):
+        is_equal = registers[compared[i, 0], 0] == registers[compared[i, 1], 0]
+        if is_equal != (compared[i, 2] != 0):
+            return False
+    return True
+
+
+@kernel
+def repeat_each(rows: Any, start: Any, compared: Any, inputs: Any, registers: Any, found: Any, holds: Any) -> None:
+    """Repeat the recorded operations for each row of inputs; `found` receives the results, `holds` whether they hold."""
+    for i in range(inputs.shape[0]):
+        holds[i] = repeat(rows, start, compared, inputs[i], registers)
+        for r in range(start.shape[0]):
+            found[i, r] = registers[r, 0]
+
+
+_repeat, _repeat_each = Precompiled(repeat), Precompiled(repeat_each)
 # registers, rows, and comparisons (both registers and the result)
 _NOTHING = np.empty((0, 1)), np.empty((0, 5), dtype=np.int64), np.empty((0, 3), dtype=np.int64)
-
-
-_advance = Precompiled(advance)
 
 
 class Recipe:
     """A recorded computation, to be repeated with other inputs."""
 
     def __init__(self, numbers: Numbers, begun: Recipe | None = None) -> None:
-        self._inputs = len(numbers.inputs)
         parts = _NOTHING if begun is None else begun._parts
         written: tuple[Sequence[Any], ...] = (numbers.values, numbers.rows, numbers.comparisons)
         self._parts: tuple[np.ndarray, ...] = tuple(
             _gone_on_with(part, lines) for part, lines in zip(parts, written, strict=True)
         )
-        self._start, self._rows, compared = self._parts
-        self._left, self._right, self._found = compared[:, 0], compared[:, 1], compared[:, 2] != 0
+        self._start, self._rows, self._compared = self._parts
 
     def values(self, inputs: Any) -> np.ndarray | None:
         """Return all registers for the given inputs, or None if a comparison differs from the recorded comparison."""
-        V = self._start.copy()
-        V[: self._inputs, 0] = inputs
-        _advance(self._rows, V, 0)
-        registers = V.reshape(-1)
-        same = (registers[self._left] == registers[self._right]) == self._found
-        return registers if same.all() else None
+        registers = np.empty_like(self._start)
+        holds = _repeat(self._rows, self._start, self._compared, np.array(inputs, dtype=float), registers)
+        return registers.reshape(-1) if holds else None
 
     def values_at(self, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return all registers for many inputs, and a mask of the inputs for which all comparisons agree."""
-        found = np.empty((len(inputs), len(self._start)))
-        _replay(self._rows, self._start[:, 0].copy(), inputs, np.empty_like(self._start), found)
-        same = (found[:, self._left] == found[:, self._right]) == self._found
-        return found, same.all(axis=1)
+        found, holds = np.empty((len(inputs), len(self._start))), np.empty(len(inputs), dtype=np.bool_)
+        again = self._rows, self._start, self._compared, np.array(inputs, dtype=float)
+        _repeat_each(*again, np.empty_like(self._start), found, holds)
+        return found, holds
 
 
 def _gone_on_with(known: np.ndarray, written: Sequence[Any]) -> np.ndarray:
     """Append the new recorded rows to an existing array, and return the result."""
     new = np.array(written[len(known) :], dtype=known.dtype).reshape(-1, known.shape[1])
     return np.concatenate([known, new])
-
-
-@kernel
-def _replay(rows: Any, start: Any, inputs: Any, V: Any, out: Any) -> None:
-    """Repeat the recorded operations for each row of inputs."""
-    for i in range(inputs.shape[0]):
-        for r in range(start.shape[0]):
-            V[r, 0] = start[r]
-        for j in range(inputs.shape[1]):
-            V[j, 0] = inputs[i, j]
-        advance(rows, V, 0)
-        for r in range(start.shape[0]):
-            out[i, r] = V[r, 0]

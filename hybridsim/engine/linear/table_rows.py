@@ -18,14 +18,14 @@ _NEAR, _SLOWEST = 0.125, 1e-300
 
 
 @kernel
-def leave_out(A: Any, guards: Any, n: int, usable: Any) -> int:
-    """Mark the modes with usable coefficients, and return their number; set the guards of other modes to -1.
+def leave_out(A: Any, guards: Any, n: int, usable: Any) -> None:
+    """Mark the modes with usable coefficients, and set the guards of other modes to -1.
 
     A (K, m, m), guards (K, G, m). Two surfaces that cannot be held together give modes with numbers that are not
     finite, which runs have only as neighbours. In the tables their motion is NaN, so that a compiled loop stops there,
     and no state counts as resting there.
     """
-    total, size = 0, A.shape[1]
+    size = A.shape[1]
     for k in range(A.shape[0]):
         usable[k] = True
         for m in range(size):
@@ -34,14 +34,12 @@ def leave_out(A: Any, guards: Any, n: int, usable: Any) -> int:
             for g in range(guards.shape[1]):
                 usable[k] = usable[k] and abs(guards[k, g, m]) < _LARGEST
         if usable[k]:
-            total += 1
             continue
         for m in range(size):
             for i in range(n):
                 A[k, i, m] = 0.0
             for g in range(guards.shape[1]):
                 guards[k, g, m] = -1.0 if m == n else 0.0  # the first function of time is 1
-    return total
 
 
 @kernel

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybridsim.engine.linear.matrix_template import template_of
-from hybridsim.engine.linear.table_rows import leave_out, write_atoms, write_tables
+from hybridsim.engine.linear.table_rows import write_atoms, write_tables
 from hybridsim.engine.linear.units import scaled_modals, units_of
 from hybridsim.engine.native.array_layout import ArrayLayout
 from hybridsim.engine.native.constants import BOUND_TERMS
@@ -170,9 +170,8 @@ def linear_tables(
     mode has a rate or a guard with a coefficient that is not finite, or is too large to be squared.
     """
     template, registers = template_of(system, met, p)
-    A, guards = template.matrices(registers)
-    usable = np.empty(len(A), dtype=np.bool_)
-    if not _leave_out(A, guards, system.n, usable):
+    A, guards, usable = template.matrices(registers[None])
+    if not any(usable.tolist()):
         return None
     atoms = template.atoms(registers)
     if begun is not None:
@@ -184,14 +183,7 @@ def linear_tables(
     return Made(*of_matrices(atoms, A, guards, usable, system.n, horizon, begun, units), A, guards)
 
 
-_leave_out, _write_atoms, _write_tables = map(Precompiled, (leave_out, write_atoms, write_tables))
-
-
-def usable_modes(A: np.ndarray, guards: np.ndarray, n: int) -> np.ndarray:
-    """Return a mask of the modes with usable coefficients; see `leave_out`."""
-    usable = np.empty(len(A), dtype=np.bool_)
-    _leave_out(A, guards, n, usable)
-    return usable
+_write_atoms, _write_tables = Precompiled(write_atoms), Precompiled(write_tables)
 
 
 def of_matrices(
@@ -231,8 +223,8 @@ def of_matrices(
 
 def tables_of(
     system: System, modes: np.ndarray, p: np.ndarray, horizon: float, is_scaled: bool
-) -> tuple[LinearTables, deque[Any]] | None:
-    """Return tables of some combinations of modes, and reusable scratch arrays for them.
+) -> tuple[LinearTables, int, deque[Any]] | None:
+    """Return tables of some combinations of modes, the number of modal coordinates, and reusable scratch arrays.
 
     The tables are made once for each set of parameter values and each horizon, the order of magnitude of the longest
     possible segment. is_scaled: whether units have the length of pieces of inputs. The scratch arrays serve all tables
@@ -244,8 +236,7 @@ def tables_of(
     made = _made(system, modes, p, horizon, None if last is None else last[2], is_scaled)
     found = None
     if made is not None:
-        tables = made.tables
-        found = tables, spare_scratch(system, len(tables.kinds), len(tables.factors), tables.values.shape)
+        found = made.tables, made.rows.form[-1], spare_scratch(system, made.rows.form, len(made.flows))
     system.tables[horizon, is_scaled] = (modes, found, made)
     return found
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from hybridsim.engine.native.kernels import ENABLED, kernel
+from hybridsim.engine.native.kernels import ENABLED, Precompiled, kernel
 from hybridsim.engine.native.struct_pack import SLOTS_PER_ARRAY
 
 if ENABLED:
@@ -89,6 +89,7 @@ class ArrayLayout:
             del form[:count]
         self._returned: list[np.ndarray] = []
         self._from_the_first = np.zeros(len(fields), dtype=np.int64)
+        self._lay_out = Precompiled(_lay_out)  # of as many blocks
 
     def blank(self) -> tuple[np.ndarray, ...]:
         """Return new uninitialised blocks."""
@@ -124,13 +125,12 @@ class ArrayLayout:
 
     def _table(self, blocks: tuple[np.ndarray, ...], skipped: np.ndarray) -> tuple[np.ndarray, int]:
         table = np.empty_like(self._entries)
-        return table, _lay_out(self._entries, self._steps, self._owners, skipped, blocks, table)
+        return table, self._lay_out(self._entries, self._steps, self._owners, skipped, blocks, table)
 
     def zeros(self) -> Any:
-        """Return new arrays of zeros as a pack, for a layout of one named tuple."""
-        blocks = self.blank()
-        for block in blocks:
-            block[:] = 0
+        """Return new arrays of zeros as a pack, for a layout of one named tuple in one block."""
+        blocks = (self._block(0),)
+        blocks[0].fill(0)
         if not ENABLED:
             return self._kinds[0][0](*self.rows(blocks))
         table, address = self._table(blocks, self._from_the_first)

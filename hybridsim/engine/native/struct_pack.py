@@ -55,13 +55,14 @@ if ENABLED:
 
         def __init__(self, title: str, fields: tuple[tuple[str, Any], ...]) -> None:
             self.title, self.fields = title, fields
+            self._rows = {name: SLOTS_PER_ARRAY * k for k, (name, _) in enumerate(fields)}
             # the name is part of the names of all kernels that take the pack
             digest = hashlib.sha256(str(fields).encode()).hexdigest()[:12]
             super().__init__(name=f"Pack({title}, {digest})")
 
         def place(self, name: str) -> int:
-            """Return the row of a field in the table of a pack."""
-            return [field[0] for field in self.fields].index(name)
+            """Return the place of a field in the table of a pack, which is the place of its address."""
+            return self._rows[name]
 
     @cache
     def type_of_fields(kind: Any, fields: tuple[Any, ...]) -> PackType:
@@ -100,7 +101,7 @@ if ENABLED:
     @lower_getattr_generic(PackType)
     def _field(context: Any, builder: Any, kind: PackType, address: Any, name: str) -> Any:
         array_type, word = dict(kind.fields)[name], ir.IntType(64)
-        row = kind.place(name) * SLOTS_PER_ARRAY
+        row = kind.place(name)
         constant = builder.module.add_metadata([])
 
         def loaded(i: int) -> Any:
@@ -134,7 +135,7 @@ if ENABLED:
 
     def address_in(pack: Any, name: str) -> np.ndarray:
         """Return the place (1,) in the table of a pack that contains the address of a field."""
-        row = pack.numba_type.place(name) * SLOTS_PER_ARRAY
+        row = pack.numba_type.place(name)
         place: np.ndarray = pack.table[row : row + 1]
         return place
 

@@ -66,8 +66,8 @@ class ClosedFormKernels(MethodKernels):
         if found is None:
             self.horizon = self._reach
             return None
-        self.lin, self.columns = found[0], found[0].values.shape[1]
-        return found
+        self.lin, self.columns, spare = found
+        return self.lin, spare
 
     def arrays(self) -> Any:
         """Return new packed arrays of the segment kernel for one call."""
