@@ -207,9 +207,9 @@ def two_numbers(value: Any, what: str, remedy: str, but: str = "") -> tuple[floa
 
 def start_values(model: Model, x0: Any, what: str = "x0") -> tuple[dict[str, float], Model]:
     """Return initial values by name, and the model with the given discrete states; `what` names the argument."""
-    names = [s.name for s in model.states]
     if x0 is None:
         return {}, model
+    names = [s.name for s in model.states]
     if not isinstance(x0, Mapping):
         each = f"use one number for each of {', '.join(names)}, or a dict of names and numbers"
         values = numbers(x0, what, each)
@@ -273,9 +273,11 @@ def step_bound(value: Any, name: str) -> float:
 
 def absolute_tolerances(model: Model, atol: Any, rtol: float, start: np.ndarray) -> np.ndarray:
     """Return atol for each state; the default is rtol * 1e-3 * nominal size."""
-    names = [s.name for s in model.states]
-    sizes = [s.nominal or abs(x) or 1.0 for s, x in zip(model.states, start, strict=True)]
+    sizes = [s.nominal or abs(x) or 1.0 for s, x in zip(model.states, start.tolist(), strict=True)]
     values = 1e-3 * rtol * np.array(sizes, dtype=float)
+    if atol is None:
+        return values
+    names = [s.name for s in model.states]
     remedy = f"use a number >= 0, or one for each of {', '.join(names)}"
     if isinstance(atol, Mapping):
         for name, value in atol.items():
@@ -283,8 +285,6 @@ def absolute_tolerances(model: Model, atol: Any, rtol: float, start: np.ndarray)
             values[names.index(name)] = number(value, f"`atol` of {name}")
     elif is_row(atol):
         values = numbers(atol, "atol", remedy)
-    elif atol is None:
-        return values
     else:
         values[:] = number(atol, "atol", remedy)
     if values.shape != start.shape or not (np.isfinite(values).all() and (values >= 0).all()):
@@ -294,7 +294,7 @@ def absolute_tolerances(model: Model, atol: Any, rtol: float, start: np.ndarray)
 
 def initial_modes(system: System, z0: Any) -> np.ndarray:
     """Return the index of the initial mode of each component, or -1 if a surface selects the mode."""
-    z = np.array([a.initial for a in system.automata], dtype=np.int64)
+    z = system.initial_modes.copy()
     if z0 is None:
         return z
     components = [a.name for a in system.declared]

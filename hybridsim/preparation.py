@@ -15,10 +15,12 @@ import numpy as np
 from hybridsim import arguments
 from hybridsim.engine.events.dissipation_check import require_dissipation
 from hybridsim.engine.native.compiler import announce_compilation
+from hybridsim.engine.record.limits import UNLIMITED
+from hybridsim.engine.record.retention import Retention
 from hybridsim.engine.record.trajectory import Task
 from hybridsim.engine.system.instant import Instant
 from hybridsim.engine.system.system import System
-from hybridsim.engine.system.system_cache import runs_of, system_of
+from hybridsim.engine.system.system_cache import bound, runs_of, system_of
 from hybridsim.engine.system.tolerances import Tolerances
 from hybridsim.engine.system.user_functions.code import PythonCode
 from hybridsim.errors import UsageError
@@ -51,6 +53,7 @@ class _Settings(NamedTuple):
     rtol: float
     longest: float
     first_step: float | None
+    retention: Retention | None  # None for the last period, whose length depends on numbers
 
 
 class _SettingsOfRuns(dict[tuple[Any, ...], _Settings]):
@@ -79,6 +82,7 @@ def prepared(
     model: Model,
     t_span: Any,
     *,
+    params: Any,
     x0: Any,
     z0: Any,
     integrator: Any,
@@ -97,19 +101,20 @@ def prepared(
     if options:  # an integer option rejects 16.0, which equals 16
         every_argument += (*chain(*options.items()), *(type(value).__name__ for value in options.values()))
     key = _run_key(t_span, every_argument)
-    run_key = key if x0 is z0 is limits is None else None
+    run_key = key if params is x0 is z0 is limits is None else None
     if run_key is not None:
         run = runs_of(model).get(run_key)
         if run is not None and type(run.method) is integrator_class(run.method.name):  # still registered
             span = run.task.t0, run.task.t1
             return run.on_grid(arguments.time_grid(t_eval, span, run.task.retention, save)), 0.0
-    x0_states, model = arguments.start_values(model, x0)
+    given, (x0_states, model) = model, arguments.start_values(arguments.chosen_model(model, params), x0)
     known = _known_settings(model, key)
     span = arguments.time_span(t_span) if known is None else known.span
     announce_compilation()
     name = arguments.integrator_name(integrator)
     began = time.perf_counter()
-    system, reason = system_of(model), ""
+    # only a model that the caller has can come again
+    system, reason = system_of(model) if model is given else bound(model), ""
     modes, start = arguments.initial_modes(system, z0), system.start_state(x0_states)
     if known is not None:
         method = known.method
@@ -134,19 +139,18 @@ def prepared(
             arguments.relative_tolerance(rtol),
             arguments.step_bound(max_step, "max_step"),
             None if first_step is None else arguments.step_bound(first_step, "first_step"),
+            None if save == "last-period" else arguments.retention_of(save, system),
         )
         refuse_endless(known.longest, span, "max_step")
         if key is not None and integrator != "auto":
             _store_settings(model, key, known)
     atols = arguments.absolute_tolerances(model, atol, known.rtol, start)
     tolerances = Tolerances(known.rtol, atols, known.longest, known.first_step)
-    retention = arguments.retention_of(save, system)
+    retention = known.retention or arguments.retention_of(save, system)
     grid = arguments.time_grid(t_eval, span, retention, save)
-    discrete = system.discrete_start
-    task = Task(
-        *span, start, modes, tolerances, discrete, retention, arguments.run_limits(limits),
-        successor=successor_of(name, system) if reason else None,
-    )  # fmt: skip
+    discrete, bounded = system.discrete_start, UNLIMITED if limits is None else arguments.run_limits(limits)
+    successor = successor_of(name, system) if reason else None
+    task = Task(*span, start, modes, tolerances, discrete, retention, bounded, successor=successor)
     require_dissipation(system, span[0], start, discrete, modes)
     run = Run(model, system, method, task, None, save, reason)
     if run_key is not None and not isinstance(system.code, PythonCode):  # a Python function may change

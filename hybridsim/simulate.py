@@ -139,11 +139,12 @@ def simulate(
     from hybridsim.preparation import prepared
     from hybridsim.solution.running import carried_out
 
-    model = arguments.chosen_model(model, params)
+    model = arguments.chosen_model(model, None)
     on_progress = arguments.callback(progress)
     run, compile_time = prepared(
         model,
         t_span,
+        params=params,
         x0=x0,
         z0=z0,
         integrator=integrator,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 from collections.abc import Mapping, Sequence
 
 from hybridsim.errors import ExpressionError, Place
@@ -29,6 +30,8 @@ def evaluate(expr: Expression, values: Mapping[str, float]) -> float:
         For an unknown name, a division by zero, a function outside its domain, or an overflow, with the expression and
         the values of its names.
     """
+    if isinstance(expr.tree, ast.Constant):  # most values of parameters
+        return float(expr.tree.value)  # type: ignore[arg-type]  # a number or a truth value
     require_names(expr, values)
     try:
         return float(value_of(expr.tree, values))

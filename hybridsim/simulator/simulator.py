@@ -87,15 +87,15 @@ class Simulator(CurrentState):
             "integrator": integrator, "rtol": rtol, "atol": atol, "max_step": max_step, "first_step": first_step,
         }  # fmt: skip
         self._options = options
-        self._prepared((0.0, 0.0), self.model, None, None)  # checks the arguments, and binds the model once
+        self._prepared((0.0, 0.0), None, None, None)  # checks the arguments, and binds the model once
         self._position: Position | None = None
         self._first: Position | None = None  # just after the last start
         self._mine = Ownership(self.model.name)
 
-    def _prepared(self, t_span: tuple[float, float], model: Model, x0: Any, z0: Any) -> Run:
+    def _prepared(self, t_span: tuple[float, float], params: Any, x0: Any, z0: Any) -> Run:
         """Return a prepared run with the settings of the simulator."""
         run, _ = prepared(
-            model, t_span, x0=x0, z0=z0, t_eval=None, save="events", limits=None, options=self._options,
+            self.model, t_span, params=params, x0=x0, z0=z0, t_eval=None, save="events", limits=None, options=self._options,
             keywords=KEYWORDS, **self._settings,
         )  # fmt: skip
         return run
@@ -176,8 +176,7 @@ class Simulator(CurrentState):
         """
         with self._mine("start"):
             begin = arguments.finite_number(t0, "t0")
-            model = arguments.chosen_model(self.model, params)
-            begun(self._prepared((begin, begin), model, x0, z0), self._commit)
+            begun(self._prepared((begin, begin), params, x0, z0), self._commit)
             found = self._taken()
             self._first = self._position
             return found

@@ -6,6 +6,7 @@ import ast
 import math
 from collections.abc import Iterator
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from hybridsim.engine.events.compiled.start import compiled_start
 from hybridsim.engine.events.outcome import Outcome, Situation
 from hybridsim.engine.events.resolve import EventResolution
 from hybridsim.engine.events.state import HybridState
+from hybridsim.engine.native.kernels import Precompiled, kernel
 from hybridsim.engine.record.trajectory import Task
 from hybridsim.engine.series.bounded import UNIT
 from hybridsim.engine.system.instant import Instant
@@ -59,13 +61,28 @@ def start_errors(system: System, x0: np.ndarray) -> np.ndarray:
     roundoff; whole numbers are exact. Bounds of guards include the roundoff of the numbers in them. The numbers inside
     Python functions are unknown, so their bounds assume a number of the size of the initial value.
     """
-    rounding = UNIT * np.abs(x0)
-    rounding[x0 == np.rint(x0)] = 0.0
-    errors = rounding.copy()
+    errors = _roundoffs(x0)
     for i, start in system.model.once_per_expressions("computed starts", partial(_computed_starts, system)):
         if x0[i] == system.start_state({})[i]:
             errors[i] = max(errors[i], rounding_of(start, system.values))
-    return errors if system.has_tape else errors + rounding
+    return errors if system.has_tape else errors + _roundoffs(x0)
+
+
+def _roundoffs(numbers: np.ndarray) -> np.ndarray:
+    """Return bounds of the roundoff of numbers; whole numbers are exact."""
+    found = np.empty_like(numbers)
+    _write_roundoffs(numbers, found)
+    return found
+
+
+@kernel
+def write_roundoffs(numbers: Any, out: Any) -> None:
+    """Write a bound of the roundoff of each number."""
+    for i in range(numbers.shape[0]):
+        out[i] = 0.0 if numbers[i] == np.rint(numbers[i]) else UNIT * abs(numbers[i])
+
+
+_write_roundoffs = Precompiled(write_roundoffs)
 
 
 def _computed_starts(system: System) -> list[tuple[int, Expression]]:

@@ -95,14 +95,14 @@ class Modals(NamedTuple):
 
 def modal(A: np.ndarray, horizon: float = math.inf) -> Modal:
     """Return the block diagonal form of a square real matrix (m, m), for times up to about `horizon`."""
-    found = modals(np.ascontiguousarray(A[None]), horizon)
+    found, _ = modals(np.ascontiguousarray(A[None]), horizon)
     return Modal(*(getattr(found, name)[0] for name in Modals._fields[1:-1]))
 
 
 def modals(
     A: np.ndarray, horizon: float = math.inf, exponent: int = 1, multiple: int = 1, least: int = 0
-) -> Modals:
-    """Return the block diagonal forms of many matrices (K, m, m), padded to a common size, as a pack."""
+) -> tuple[Modals, int]:
+    """Return the block diagonal forms of many matrices (K, m, m), padded to a common size, as a pack, and this size."""
     scales, counts = np.empty(A.shape[:2]), np.empty(len(A), dtype=np.int64)
     balanced, basis = np.empty(A.shape), np.empty(A.shape)
     is_diagonal, are_right = np.empty(len(A), dtype=np.bool_), np.empty(len(A), dtype=np.bool_)
@@ -124,7 +124,7 @@ def modals(
         parts = (*vars(flow).values(), flow.power(exponent))
         for name, part in zip(Modals._fields[1:], parts, strict=True):
             getattr(result, name)[k][tuple(slice(0, m) for m in part.shape)] = part
-    return result
+    return result, widest
 
 
 @lru_cache(64)

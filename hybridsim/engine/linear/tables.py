@@ -203,14 +203,12 @@ def of_matrices(
     """
     count, surfaces, size = guards.shape
     first, least = (0, 0) if begun is None else (len(begun.flows), begun.rows.form[-1])
-    flows = scaled_modals(A[first:], units if units is None else units[first:], horizon, least)
-    widest = flows.values.shape[1]
+    flows, widest = scaled_modals(A[first:], units if units is None else units[first:], horizon, least)
     if begun is not None and widest == least:
         rows = begun.rows.gone_on_with(first, count)
     else:
         if first:
-            first, flows = 0, scaled_modals(A, units, horizon)
-            widest = flows.values.shape[1]
+            first, (flows, widest) = 0, scaled_modals(A, units, horizon)
         kinds, _, _, _, sources, _, factors, _ = atoms
         rows = _Rows(((len(kinds), len(sources), factors.shape[1]), surfaces, n, size, widest), count)
         rows.count = count

@@ -19,15 +19,15 @@ def horizon_class(horizon: float) -> float:
     return 16.0 ** math.ceil(math.log(horizon, 16.0)) if horizon > 0.0 else math.inf
 
 
-def scaled_modals(A: np.ndarray, units: np.ndarray | None, horizon: float, least: int = 0) -> Modals:
-    """Return the block diagonal forms of matrices (K, m, m), computed in units (K, m) of their variables."""
+def scaled_modals(A: np.ndarray, units: np.ndarray | None, horizon: float, least: int = 0) -> tuple[Modals, int]:
+    """Return what `modals` returns for matrices (K, m, m), computed in units (K, m) of their variables."""
     if units is None:
         return modals(A, horizon, BOUND_TERMS, multiple=LANES // 2, least=least)
     scaled = A * units[:, None, :] / units[:, :, None]
-    flows = modals(scaled, horizon, BOUND_TERMS, multiple=LANES // 2, least=least)
+    flows, widest = modals(scaled, horizon, BOUND_TERMS, multiple=LANES // 2, least=least)
     flows.full_basis[...] *= units[:, :, None]
     flows.inverse[...] /= units[:, None, :]
-    return flows
+    return flows, widest
 
 
 def units_of(atoms: tuple[np.ndarray, ...], A: np.ndarray, n: int, length: float) -> np.ndarray:

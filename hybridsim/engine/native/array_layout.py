@@ -20,8 +20,10 @@ if ENABLED:
     class LayoutPack(Packed):
         """A pack of the arrays of a layout; each array is made when it is first read in Python."""
 
-        def __init__(self, layout: ArrayLayout, blocks: tuple[np.ndarray, ...], *rest: Any) -> None:
-            super().__init__(None, *rest)
+        def __init__(
+            self, layout: ArrayLayout, blocks: tuple[np.ndarray, ...], table: np.ndarray, kind: Any, address: int
+        ) -> None:
+            self.table, self.numba_type, self.address = table, kind, address
             self._layout, self._blocks = layout, blocks
 
         def __getattr__(self, name: str) -> np.ndarray:

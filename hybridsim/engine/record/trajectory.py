@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property, partial
 from typing import Any
 
@@ -172,16 +172,13 @@ class Task:
     record: Trajectory | None = None  # record to continue, from its checkpoint
     successor: Any = None  # a stiff method (`hybridsim.engine.run.stepping.Method`), which may take over
     is_stepped: bool = False  # whether t1 is an instant of its own, at which the run leaves a checkpoint
+    # set-ups of runs; a copy of the task has its own
+    setups: dict[str, Any] = field(init=False, compare=False, repr=False, default_factory=dict)
 
-    @cached_property
+    @property
     def forward(self) -> bool:
         """Return whether time runs forward."""
         return self.t1 >= self.t0
-
-    @cached_property
-    def setups(self) -> dict[str, Any]:
-        """Return the dictionary in which the task stores its set-ups."""
-        return {}
 
     @cached_property
     def beginning(self) -> tuple[Any, ...]:

@@ -72,5 +72,4 @@ class Registers:
         """Write the parameters in the run-time vector p and their roundoff to the values of `rounded` inputs."""
         known: Inputs = self.inputs
         numbers, first = p[known.sources], len(known.constants)
-        if numbers.tobytes() != values[first:, 0].tobytes():
-            values[first:, 0], values[first:, 1] = numbers, list(map(own_roundoff, numbers.tolist()))
+        values[first:, 0], values[first:, 1] = numbers, list(map(own_roundoff, numbers.tolist()))

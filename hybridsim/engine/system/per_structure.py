@@ -21,11 +21,13 @@ def per_structure(make: Callable[[Any, *Key], Made], most: int = sys.maxsize) ->
 
     @wraps(make, updated=())
     def of(system: Any, *key: *Key) -> Made:
-        made: dict[tuple[*Key], Made] = system.code.shared.setdefault(of, {})
+        shared = system.code.shared
         try:
-            return made[key]
+            known: Made = shared[of][key]
+            return known
         except KeyError:
             found = make(system, *key)
+        made: dict[tuple[*Key], Made] = shared.setdefault(of, {})
         if len(made) >= most:
             made.clear()
         return made.setdefault(key, found)

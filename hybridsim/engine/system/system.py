@@ -124,6 +124,7 @@ class _Frame:
         self.led = tuple(c for c, a in enumerate(self.automata) if a.is_corner or a.is_load)
         self.declared = self.automata[: len(self.automata) - int(self.is_corner.sum())]  # without corners
         self.component_numbers = np.arange(len(self.automata))
+        self.initial_modes = np.array([a.initial for a in self.automata], dtype=np.int64)
         self.guard_table = self._guard_table()
         self.guard_count: int = data["guard_count"]
         self.surface_of: tuple[int, ...] = data["surfaces"]  # component of each surface
@@ -237,8 +238,8 @@ class System(_Frame):
 
     def start_state(self, overrides: Mapping[str, float]) -> np.ndarray:
         """Return the initial states in the order of the state vector."""
-        values = self._start | dict(overrides)
-        return np.array([float(values[n]) for n in self.names])
+        values = {**self._start, **overrides}
+        return np.array([values[n] for n in self.names], dtype=float)
 
     @cached_property
     def _start(self) -> dict[str, float]:

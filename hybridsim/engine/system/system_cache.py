@@ -22,18 +22,23 @@ def runs_of(model: Model) -> dict[Any, Any]:
     return {} if known is None else known[1]
 
 
-def system_of(model: Model) -> System:
-    """Return the system of a valid model from the cache, or bind the model to a new system.
+def bound(model: Model) -> System:
+    """Bind a model to a new system.
 
     Raises
     ------
     ModelError
         With all faults of the model.
     """
+    return System(model.validate())
+
+
+def system_of(model: Model) -> System:
+    """Return the system of a model from the cache, or bind the model to a new system, as `bound` does."""
     known = _systems.get(id(model))
     if known is not None and known[0].code.is_current:
         return known[0]
-    system = System(model.validate())
+    system = bound(model)
     with _lock:
         while len(_systems) >= _MAX_SYSTEMS:
             del _systems[next(iter(_systems))]

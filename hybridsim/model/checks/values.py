@@ -37,13 +37,16 @@ class _Check(NamedTuple):
 
 def errors_of_numbers(model: Model, changed: frozenset[str]) -> tuple[ModelError, ...]:
     """Return the errors of a copy of a valid model, in which some parameters have other values."""
-    findings, checks = Findings(model), _checks_of(model)
-    affected = [check for check in checks if not changed.isdisjoint(check.names)]
-    if affected:
-        used = frozenset[str]().union(*(check.names for check in affected))
-        affected = [c for c in checks if not changed.isdisjoint(c.names) or c.defines in used]
-    _carry_out(findings, affected)
+    findings = Findings(model)
+    _carry_out(findings, model.once_per_expressions(("checks", changed), lambda: _affected(model, changed)))
     return tuple(findings.errors)
+
+
+def _affected(model: Model, changed: frozenset[str]) -> list[_Check]:
+    """Return the checks that depend on some parameters, and the definitions that these checks use."""
+    checks = _checks_of(model)
+    used = frozenset[str]().union(*(check.names for check in checks if not changed.isdisjoint(check.names)))
+    return [check for check in checks if not changed.isdisjoint(check.names) or check.defines in used]
 
 
 def check_values(findings: Findings) -> None:

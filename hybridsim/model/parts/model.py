@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Hashable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any, ClassVar
@@ -52,7 +52,7 @@ _PARTS: dict[str, type[Declared]] = {
 
 # methods that other parts of the package call; completion does not offer them
 _INTERNAL = {
-    "affected_by", "changed_numbers", "components_of", "connected_units", "error", "is_known_to_be_sound", "once",
+    "changed_numbers", "components_of", "connected_units", "error", "is_known_to_be_sound", "once",
     "once_per_expressions", "place", "structure", "with_values_of",
 }  # fmt: skip
 
@@ -290,7 +290,7 @@ class Model(Declared):
         return copy
 
     @cached_property
-    def _unnumbered(self) -> dict[str, Any]:
+    def _unnumbered(self) -> dict[Hashable, Any]:
         """The results that depend on the structure and the expressions of parameters, but not on numbers."""
         return {}
 
@@ -304,7 +304,7 @@ class Model(Declared):
             self._common[name] = make()
         return self._common[name]
 
-    def once_per_expressions(self, name: str, make: Callable[[], Any]) -> Any:
+    def once_per_expressions(self, name: Hashable, make: Callable[[], Any]) -> Any:
         """Return a result that depends only on the structure and on parameter expressions; copies share the result."""
         if name not in self._unnumbered:
             self._unnumbered[name] = make()
@@ -365,7 +365,7 @@ class Model(Declared):
         values, positions = dict(self._unnumbered["sound"][0]), self._positions()
         for name in changed:
             values[name] = evaluate(self.parameters[positions[name]].value, values)
-        for name, value in self.affected_by(changed):
+        for name, value in self.once_per_expressions(("affected", changed), partial(self._affected_by, changed)):
             values[name] = evaluate(value, values)
         return values
 
@@ -376,20 +376,15 @@ class Model(Declared):
         )
         return positions
 
-    def affected_by(self, names: Iterable[str]) -> list[tuple[str, Expression]]:
+    def _affected_by(self, names: Iterable[str]) -> list[tuple[str, Expression]]:
         """Return the parameters that depend on the given parameters, with their expressions, in order of evaluation."""
         found, reached = [], set(names)
-        for name, value in self.once_per_expressions("derived", self._derived):
-            if not reached.isdisjoint(value.names):
-                found.append((name, value))
+        values = {parameter.name: parameter.value for parameter in self.parameters}
+        for name in dependency_order(values, "parameters"):
+            if not reached.isdisjoint(values[name].names):
+                found.append((name, values[name]))
                 reached.add(name)
         return found
-
-    def _derived(self) -> list[tuple[str, Expression]]:
-        """Return the parameters that are expressions of other parameters, in order of evaluation."""
-        values = {parameter.name: parameter.value for parameter in self.parameters}
-        order = dependency_order(values, "parameters")
-        return [(name, values[name]) for name in order if values[name].names]
 
     def start_values(self) -> dict[str, float]:
         """Return the initial values of the states for the current parameters."""

@@ -179,6 +179,7 @@ class StartScratch:
         without = {"bounds": np.zeros_like(cache.tapes.bounds), "lacked": np.zeros_like(cache.tapes.lacked)}
         self.tapes = packed(cache.tapes.arrays._replace(**without))  # type: ignore[attr-defined]  # of a pack
         self.inputs, self.values = system.registers.rounded()
+        self.filled = b""  # the run-time vector in `values`
         self.automata, self.surfaces = automata_of(system), surfaces_of(system)
         self.work.entry_points[SERIES] = kernel_address(
             interpreted_series,
@@ -208,7 +209,10 @@ def compiled_start(system: System, x0: np.ndarray, x_error: np.ndarray, p: np.nd
         scratch = StartScratch(system)
     state = scratch.state
     state.x[:], state.x_error[:], state.p[:] = x0, x_error, p
-    system.registers.fill(scratch.values, p)
+    key = p.tobytes()
+    if scratch.filled != key:
+        system.registers.fill(scratch.values, p)
+        scratch.filled = key
     is_certain = _plain_start(
         scratch.automata, scratch.tapes, scratch.inputs, scratch.nothing, system.layout.pin_at, scratch.surfaces,
         scratch.as_packed, scratch.work,
