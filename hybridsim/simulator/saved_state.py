@@ -90,8 +90,9 @@ def _unpickled(
     (name, options, reason), (t0, x0, z0, discrete, tolerances) = method, begin
     checkpoint, counters, warnings, events, ended = rest
     run, _ = prepared(
-        model_of(source), (t0, t0), params=None, x0=None, z0=None, integrator=name, rtol=None, atol=None, max_step=float("inf"),
-        first_step=None, t_eval=None, save="events", limits=None, options=options, keywords=KEYWORDS,
+        model_of(source), (t0, t0), params=None, x0=None, z0=None, integrator=name, rtol=None, atol=None,
+        max_step=float("inf"), first_step=None, t_eval=None, save="events", limits=None, options=options,
+        keywords=KEYWORDS,
     )  # fmt: skip
     successor = successor_of(name, run.system) if reason else None
     task = replace(run.task, x0=x0, z0=z0, discrete=discrete, tolerances=tolerances, successor=successor)

@@ -95,8 +95,8 @@ class Simulator(CurrentState):
     def _prepared(self, t_span: tuple[float, float], params: Any, x0: Any, z0: Any) -> Run:
         """Return a prepared run with the settings of the simulator."""
         run, _ = prepared(
-            self.model, t_span, params=params, x0=x0, z0=z0, t_eval=None, save="events", limits=None, options=self._options,
-            keywords=KEYWORDS, **self._settings,
+            self.model, t_span, params=params, x0=x0, z0=z0, t_eval=None, save="events", limits=None,
+            options=self._options, keywords=KEYWORDS, **self._settings,
         )  # fmt: skip
         return run
 

@@ -129,7 +129,9 @@ def repeat(rows: Any, start: Any, compared: Any, inputs: Any, registers: Any) ->
 
 
 @kernel
-def repeat_each(rows: Any, start: Any, compared: Any, inputs: Any, registers: Any, found: Any, holds: Any) -> None:
+def repeat_each(
+    rows: Any, start: Any, compared: Any, inputs: Any, registers: Any, found: Any, holds: Any
+) -> None:
     """Repeat the recorded operations for each row of inputs, and write all results to the rows of `found`."""
     for i in range(inputs.shape[0]):
         holds[i] = repeat(rows, start, compared, inputs[i], registers)

@@ -19,7 +19,9 @@ def horizon_class(horizon: float) -> float:
     return 16.0 ** math.ceil(math.log(horizon, 16.0)) if horizon > 0.0 else math.inf
 
 
-def scaled_modals(A: np.ndarray, units: np.ndarray | None, horizon: float, least: int = 0) -> tuple[Modals, int]:
+def scaled_modals(
+    A: np.ndarray, units: np.ndarray | None, horizon: float, least: int = 0
+) -> tuple[Modals, int]:
     """Return what `modals` returns for matrices (K, m, m), computed in units (K, m) of their variables."""
     if units is None:
         return modals(A, horizon, BOUND_TERMS, multiple=LANES // 2, least=least)

@@ -21,7 +21,12 @@ if ENABLED:
         """A pack of the arrays of a layout; each array is made when it is first read in Python."""
 
         def __init__(
-            self, layout: ArrayLayout, blocks: tuple[np.ndarray, ...], table: np.ndarray, kind: Any, address: int
+            self,
+            layout: ArrayLayout,
+            blocks: tuple[np.ndarray, ...],
+            table: np.ndarray,
+            kind: Any,
+            address: int,
         ) -> None:
             self.table, self.numba_type, self.address = table, kind, address
             self._layout, self._blocks = layout, blocks

@@ -365,7 +365,9 @@ class Model(Declared):
         values, positions = dict(self._unnumbered["sound"][0]), self._positions()
         for name in changed:
             values[name] = evaluate(self.parameters[positions[name]].value, values)
-        for name, value in self.once_per_expressions(("affected", changed), partial(self._affected_by, changed)):
+        for name, value in self.once_per_expressions(
+            ("affected", changed), partial(self._affected_by, changed)
+        ):
             values[name] = evaluate(value, values)
         return values
 
