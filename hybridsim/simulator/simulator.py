@@ -257,7 +257,8 @@ class Simulator(CurrentState):
             return None
         if not isinstance(inputs, Mapping):
             raise arguments.cannot_be("inputs", inputs, "use a dict of names and numbers")
-        held_indices, discrete = position.held_indices, position.discrete.copy()
+        held_indices, former = position.held_indices, position.discrete
+        discrete = former.copy()
         for name, value in inputs.items():
             if name not in held_indices:
                 raise UsageError(
@@ -265,7 +266,7 @@ class Simulator(CurrentState):
                     remedy=nearest(str(name), held_indices, kind="held inputs"),
                 )
             discrete[held_indices[name]] = arguments.finite_number(value, f"`inputs` of {name}")
-        return None if discrete.tobytes() == position.discrete.tobytes() else discrete
+        return None if discrete.tobytes() == former.tobytes() else discrete
 
     def _taken(self) -> tuple[Event, ...]:
         """Return the events that were not returned by earlier calls."""

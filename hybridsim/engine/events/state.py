@@ -77,8 +77,8 @@ class HybridState:
     def divide(self) -> None:
         """Make this state the start of a new segment in unchanged modes, at which no guard is zero."""
         memory, views = self.memory, self._views  # views of arrays cost more than this
-        sides, orders, floors, end = (views[name][2] // 8 for name in ("sides", "orders", "floors", "z"))
-        memory[floors:end] = memory[orders:] = 0.0
+        sides, orders = views["sides"][2] // 8, views["orders"][2] // 8
+        memory[views["floors"][2] // 8 : views["z"][2] // 8] = memory[orders:] = 0.0
         memory[sides:orders] = _ONE
 
     def copy(self) -> HybridState:

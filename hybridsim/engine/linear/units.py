@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from hybridsim.engine.series.layout import SIGNAL_SLOTS
 from hybridsim.engine.system.known_times import START
 
 
+@lru_cache(64)
 def horizon_class(horizon: float) -> float:
     """Return the order of magnitude of a segment length, for which tables are computed."""
     return 16.0 ** math.ceil(math.log(horizon, 16.0)) if horizon > 0.0 else math.inf

@@ -96,7 +96,7 @@ class ArrayLayout:
             del form[:count]
         self._returned: list[np.ndarray] = []
         self._from_the_first = np.zeros(len(fields), dtype=np.int64)
-        self._lay_out = Precompiled(_lay_out)  # of as many blocks
+        self._lay_out, self._lay_out_rest = Precompiled(_lay_out), Precompiled(_lay_out)  # of as many blocks
 
     def blank(self) -> tuple[np.ndarray, ...]:
         """Return new uninitialised blocks."""
@@ -115,24 +115,20 @@ class ArrayLayout:
         if len(self._returned) < _RETURNED:
             self._returned.append(block)
 
-    def packed(self, blocks: tuple[np.ndarray, ...], skipped: np.ndarray | None = None) -> list[Any]:
+    def packed(self, blocks: tuple[np.ndarray, ...], skipped: tuple[int, ...]) -> list[Any]:
         """Return packs of the arrays of each named tuple; `skipped` rows are omitted at the start."""
         packs: list[Any] = []
-        rows = self._from_the_first if skipped is None else skipped
         if not ENABLED:
-            arrays = iter(zip(self.rows(blocks), rows, strict=True))
+            arrays = iter(zip(self.rows(blocks), skipped, strict=True))
             for kind, count in self._kinds:
                 packs.append(kind(*(a[k:] for a, k in islice(arrays, count))))
             return packs
-        table, address = self._table(blocks, rows)
+        table = np.empty_like(self._entries)
+        address = self._lay_out_rest(self._entries, self._steps, self._owners, skipped, blocks, table)
         for form, size in self._types:
             packs.append(Packed(None, table, form, address))
             address += size
         return packs
-
-    def _table(self, blocks: tuple[np.ndarray, ...], skipped: np.ndarray) -> tuple[np.ndarray, int]:
-        table = np.empty_like(self._entries)
-        return table, self._lay_out(self._entries, self._steps, self._owners, skipped, blocks, table)
 
     def zeros(self) -> Any:
         """Return new arrays of zeros as a pack, for a layout of one named tuple in one block."""
@@ -140,7 +136,8 @@ class ArrayLayout:
         blocks[0].fill(0)
         if not ENABLED:
             return self._kinds[0][0](*self.rows(blocks))
-        table, address = self._table(blocks, self._from_the_first)
+        table = np.empty_like(self._entries)
+        address = self._lay_out(self._entries, self._steps, self._owners, self._from_the_first, blocks, table)
         return LayoutPack(self, blocks, table, self._types[0][0], address)
 
     def __contains__(self, name: str) -> bool:

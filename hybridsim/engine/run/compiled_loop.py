@@ -125,6 +125,9 @@ class CompiledLoop:
         """Allocate new arrays for later calls, because the trajectory keeps the arrays of earlier calls."""
         self.used = (0, 0)  # used rows of steps, and of segments
         self.memory: tuple[np.ndarray, ...] | None = None
+        self._packed: tuple[tuple[int, int], list[Any]] | None = (
+            None  # used rows, and packs of the rows behind them
+        )
 
     @property
     def place(self) -> tuple[np.ndarray, ...]:
@@ -167,10 +170,12 @@ class CompiledLoop:
                 kind = kernels.rows, kernels.keeps_starts, *kernels.fields()
                 self._layouts[key] = record_layout(kernels.system, self.steps, *kind)
             self.array_layout = self._layouts[key]
-            self.memory = self.array_layout.blank()
+            self.memory, self._packed = self.array_layout.blank(), None
         steps, first = self.used
-        skipped = skipped_rows(first, steps, len(kernels.rows._fields))
-        record, rows = self.array_layout.packed(self.memory, skipped)
+        if self._packed is None or self._packed[0] != self.used:
+            skipped = skipped_rows(first, steps, len(kernels.rows._fields))
+            self._packed = self.used, self.array_layout.packed(self.memory, skipped)
+        record, rows = self._packed[1]
         try:
             arrays = spare.pop()
         except IndexError:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -47,10 +47,9 @@ def record_layout(
     )
 
 
-@lru_cache(64)
-def skipped_rows(first: int, steps: int, count: int) -> np.ndarray:
+def skipped_rows(first: int, steps: int, count: int) -> tuple[int, ...]:
     """Return how many rows at the start of each array are omitted; the last `count` arrays belong to the method."""
-    return np.array([first, first, first, first + 1, first, first] + [steps] * count, dtype=np.int64)
+    return (first, first, first, first + 1, first, first, *(steps,) * count)
 
 
 class LoopResult(NamedTuple):

@@ -256,7 +256,7 @@ class System(_Frame):
         p = self._base.copy()
         at = self.layout
         p[at.discrete_slice] = discrete
-        p[at.origin_at] = float(origin)
+        p[at.origin_at] = origin.high + origin.low
         for place, rate in self._turning:
             p[place] = phase_of(origin.high, origin.low, rate, 0.0)
         for k, signal in enumerate(self.signals):

@@ -58,10 +58,11 @@ class ClosedFormKernels(MethodKernels):
         self, tapes: Tapes, state: HybridState, origin: Instant, target: Instant
     ) -> tuple[Any, deque[Any]] | None:
         """Return the tables of the modes so far, and reusable arrays for tables of this shape."""
-        self._reach = max(self.horizon, min(target.minus(origin), self.longest))
-        horizon = horizon_class(self._reach)
         if self._piece < math.inf:
             self._reach = horizon = self._piece
+        else:
+            self._reach = max(self.horizon, min(target.minus(origin), self.longest))
+            horizon = horizon_class(self._reach)
         found = tables_of(self.system, tapes.modes, state.p, horizon, self._piece < math.inf)
         if found is None:
             self.horizon = self._reach

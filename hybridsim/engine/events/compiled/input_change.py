@@ -20,6 +20,7 @@ from hybridsim.engine.native.kernels import ENABLED, Precompiled, inline_always,
 from hybridsim.engine.native.loop_hints import put
 from hybridsim.engine.native.struct_pack import packed
 from hybridsim.engine.series.bounded import run_series
+from hybridsim.engine.series.optimise import live_rows
 from hybridsim.engine.system.instant import Instant
 from hybridsim.engine.system.per_structure import per_structure, spare_scratch
 from hybridsim.engine.system.programs.mode_tables import tape_cache_of
@@ -30,17 +31,17 @@ _LEAST = math.ulp(0.0)  # error of the time of zeros at an instant without an ev
 
 
 class SurfaceTape(NamedTuple):
-    """The instruction tape of one combination of modes, with the registers of the surfaces."""
+    """The instruction tape of one combination of modes, with the registers of surfaces that read discrete values."""
 
     constant: np.ndarray  # rows executed once per segment
     rows: np.ndarray
     derivatives: np.ndarray  # registers of the rates
-    surfaces: np.ndarray  # registers of the surfaces
+    surfaces: np.ndarray  # registers of these surfaces
 
 
 @inline_always
 def _surfaces_stay(inputs: Any, tape: Any, pin_at: int, former: Any, state: Any, work: Any) -> bool:
-    """Return whether every surface has the same value before and after the change of the run-time vector."""
+    """Return whether the surfaces of the tape have the same values before and after a change of the run-time vector."""
     V, E, exact, values = work.V, work.E, work.y_error, work.jumps
     count = tape.surfaces.shape[0]
     for i in range(exact.shape[0]):
@@ -100,8 +101,22 @@ def admit_modes(
 
 @per_structure
 def _surface_tape(system: System, modes: bytes) -> SurfaceTape:
-    tape = system.optimised_tape(np.frombuffer(modes, dtype=np.int64))
-    found: SurfaceTape = packed(SurfaceTape(tape.constant_rows, tape.rows, tape.derivatives, tape.surfaces))
+    tape, inputs, place = (
+        system.optimised_tape(np.frombuffer(modes, dtype=np.int64)),
+        system.registers.inputs,
+        system.layout.discrete_slice,
+    )
+    discrete = set(
+        inputs.parameters[(inputs.sources >= place.start) & (inputs.sources < place.stop)].tolist()
+    )
+    rows = [*map(tuple, tape.constant_rows.tolist()), *map(tuple, tape.rows.tolist())]
+
+    def reads_discrete(surface: int) -> bool:
+        read = {surface}.union(*(row[1:4] for row in live_rows(rows, {surface})))
+        return not read.isdisjoint(discrete)
+
+    surfaces = np.array([r for r in tape.surfaces.tolist() if reads_discrete(r)], dtype=np.int64)
+    found: SurfaceTape = packed(SurfaceTape(tape.constant_rows, tape.rows, tape.derivatives, surfaces))
     return found
 
 
