@@ -16,10 +16,10 @@ _SWEEPS = 8  # most sweeps of balancing
 
 
 @kernel
-def balance(A: Any, horizon: float, sizes: Any, scales: Any, balanced: Any) -> None:
-    """Balance a matrix A by a diagonal D of powers of two; write D to `scales`, and D^-1 A D to `balanced`.
+def balance(A: Any, horizon: float, found: Any) -> None:
+    """Balance matrices A by diagonals D of powers of two, and write them to `found` (`Balanced` of `modal`).
 
-    The method is that of E. E. Osborne, J. ACM 7 (1960) 338. sizes (k, m, m) is scratch.
+    The method is that of E. E. Osborne, J. ACM 7 (1960) 338.
 
     The 2-norms include the diagonal. Without it, couplings that are negligible compared with the diagonal
     would be scaled up with its roundings (R. James, J. Langou and B. R. Lowery, arXiv:1401.5766). Couplings
@@ -27,7 +27,7 @@ def balance(A: Any, horizon: float, sizes: Any, scales: Any, balanced: Any) -> N
     cancel.
     """
     for k in range(A.shape[0]):
-        size, scale = sizes[k], scales[k]
+        size, scale = found.basis[k], found.scales[k]
         m = size.shape[0]
         for i in range(m):
             scale[i] = 1.0
@@ -65,12 +65,12 @@ def balance(A: Any, horizon: float, sizes: Any, scales: Any, balanced: Any) -> N
                 break
         for i in range(m):
             for j in range(m):
-                balanced[k, i, j] = A[k, i, j] * scale[j] / scale[i]
+                found.balanced[k, i, j] = A[k, i, j] * scale[j] / scale[i]
 
 
 @kernel
-def real_columns(values: Any, vectors: Any, out: Any) -> None:
-    """Write the real part of each eigenvector; for the second of two conjugates, write the imaginary part.
+def real_columns(values: Any, vectors: Any, found: Any) -> None:
+    """Write the real part of each eigenvector to the basis; for the second of two conjugates, the imaginary part.
 
     Both represent the pair. A complex inverse would make the two conjugates of each other only to within the
     condition of the basis.
@@ -79,24 +79,16 @@ def real_columns(values: Any, vectors: Any, out: Any) -> None:
         for j in range(values.shape[1]):
             for i in range(values.shape[1]):
                 entry = vectors[k, i, j]
-                out[k, i, j] = -entry.imag if values[k, j].imag < 0.0 else entry.real
+                found.basis[k, i, j] = -entry.imag if values[k, j].imag < 0.0 else entry.real
 
 
 @kernel
-def check_eigenvectors(
-    balanced: Any,
-    values: Any,
-    vectors: Any,
-    inverses: Any,
-    horizon: float,
-    counts: Any,
-    chosen: Any,
-    right: Any,
-) -> int:
+def check_eigenvectors(values: Any, vectors: Any, inverses: Any, horizon: float, found: Any) -> int:
     """Write the number of coordinates of each matrix, and whether its eigenvectors are accurate and a good basis.
 
     inverses: those of `real_columns`. Return the largest number of coordinates, or -1 if some are not good.
     """
+    balanced, counts, chosen, right = found.balanced, found.counts, found.is_diagonal, found.are_right
     all_chosen, most = True, 0
     for k in range(values.shape[0]):
         size, total, largest, fastest = values.shape[1], 0.0, 0.0, 0.0
@@ -126,10 +118,9 @@ def check_eigenvectors(
 
 
 @kernel
-def write_diagonal(
-    counts: Any, values: Any, vectors: Any, inverses: Any, scales: Any, chosen: Any, exponent: int, out: Any
-) -> None:
-    """Write one block for each eigenvalue of the chosen matrices to `out` (`hybridsim.engine.linear.modal.Modals`)."""
+def write_diagonal(values: Any, vectors: Any, inverses: Any, exponent: int, found: Any, out: Any) -> None:
+    """Write one block for each eigenvalue of the diagonal matrices to `out` (`Modals` of `modal`)."""
+    counts, scales, chosen = found.counts, found.scales, found.is_diagonal
     for k in range(values.shape[0]):
         out.counts[k] = counts[k]
         if not chosen[k]:

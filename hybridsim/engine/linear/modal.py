@@ -24,7 +24,7 @@ from hybridsim.engine.linear.diagonal import (
 )
 from hybridsim.engine.linear.lapack import eigenvectors, inverse_matrices
 from hybridsim.engine.linear.small_entries import with_small_rows
-from hybridsim.engine.native.array_layout import ArrayLayout
+from hybridsim.engine.native.array_layout import ArrayLayout, release
 from hybridsim.engine.native.kernels import Precompiled
 
 _balance, _real_columns = Precompiled(balance), Precompiled(real_columns)
@@ -93,6 +93,17 @@ class Modals(NamedTuple):
     powers: np.ndarray  # (K, J) |B**exponent| of the block of each coordinate, for the requested exponent
 
 
+class Balanced(NamedTuple):
+    """Balanced matrices of which the block diagonal forms are computed, and what is known of their eigenvectors."""
+
+    scales: np.ndarray  # (K, m) the diagonal D
+    balanced: np.ndarray  # (K, m, m) D^-1 A D
+    basis: np.ndarray  # (K, m, m) real and imaginary parts of the eigenvectors; before that scratch
+    counts: np.ndarray  # (K,) number of coordinates
+    is_diagonal: np.ndarray  # (K,) whether the eigenvectors are a good basis
+    are_right: np.ndarray  # (K,) whether they are accurate
+
+
 def modal(A: np.ndarray, horizon: float = math.inf) -> Modal:
     """Return the block diagonal form of a square real matrix (m, m), for times up to about `horizon`."""
     found, _ = modals(np.ascontiguousarray(A[None]), horizon)
@@ -103,28 +114,38 @@ def modals(
     A: np.ndarray, horizon: float = math.inf, exponent: int = 1, multiple: int = 1, least: int = 0
 ) -> tuple[Modals, int]:
     """Return the block diagonal forms of many matrices (K, m, m), padded to a common size, as a pack, and this size."""
-    scales, counts = np.empty(A.shape[:2]), np.empty(len(A), dtype=np.int64)
-    balanced, basis = np.empty(A.shape), np.empty(A.shape)
-    is_diagonal, are_right = np.empty(len(A), dtype=np.bool_), np.empty(len(A), dtype=np.bool_)
-    _balance(A, horizon, basis, scales, balanced)
+    count, size, others = *A.shape[:2], {}
+    found: Balanced = _layout_of_balanced(count, size).zeros()
+    _balance(A, horizon, found)
     with np.errstate(all="ignore"):
-        values, vectors = eigenvectors(balanced)
-        _real_columns(values, vectors, basis)
-        inverses, others = inverse_matrices(basis), {}
-    most = _check_eigenvectors(balanced, values, vectors, inverses, horizon, counts, is_diagonal, are_right)
+        values, vectors = eigenvectors(found.balanced)
+        _real_columns(values, vectors, found)
+        inverses = inverse_matrices(found.basis)
+    most = _check_eigenvectors(values, vectors, inverses, horizon, found)
     if most < 0:
-        for k in np.flatnonzero(~is_diagonal).tolist():
-            others[k] = _by_blocks(balanced[k], values[k], vectors[k], scales[k], bool(are_right[k]))
-            counts[k] = len(others[k].values)
-        most = int(counts.max())
-    count, size, widest = *A.shape[:2], -(-max(most, least) // multiple) * multiple
+        for k in np.flatnonzero(~found.is_diagonal).tolist():
+            parts = found.balanced[k], values[k], vectors[k], found.scales[k], bool(found.are_right[k])
+            others[k] = _by_blocks(*parts)
+            found.counts[k] = len(others[k].values)
+        most = int(found.counts.max())
+    widest = -(-max(most, least) // multiple) * multiple
     result: Modals = _layout(count, size, widest).zeros()
-    _diagonal(counts, values, vectors, inverses, scales, is_diagonal, exponent, result)
+    _diagonal(values, vectors, inverses, exponent, found, result)
+    release(found)
     for k, flow in others.items():
-        parts = (*vars(flow).values(), flow.power(exponent))
-        for name, part in zip(Modals._fields[1:], parts, strict=True):
+        fields = (*vars(flow).values(), flow.power(exponent))
+        for name, part in zip(Modals._fields[1:], fields, strict=True):
             getattr(result, name)[k][tuple(slice(0, m) for m in part.shape)] = part
     return result, widest
+
+
+@lru_cache(64)
+def _layout_of_balanced(count: int, size: int) -> ArrayLayout:
+    """Return the layout of `Balanced` for matrices (count, size, size)."""
+    fields: list[tuple[Any, tuple[int, ...]]] = [
+        (float, (size,)), (float, (size, size)), (float, (size, size)), (np.int64, ()), (np.bool_, ()), (np.bool_, ()),
+    ]  # fmt: skip
+    return ArrayLayout((Balanced,), [(dtype, (count, *shape), 0) for dtype, shape in fields])
 
 
 @lru_cache(64)

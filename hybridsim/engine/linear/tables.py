@@ -11,7 +11,7 @@ import numpy as np
 from hybridsim.engine.linear.matrix_template import template_of
 from hybridsim.engine.linear.table_rows import write_atoms, write_tables
 from hybridsim.engine.linear.units import scaled_modals, units_of
-from hybridsim.engine.native.array_layout import ArrayLayout
+from hybridsim.engine.native.array_layout import ArrayLayout, release
 from hybridsim.engine.native.constants import BOUND_TERMS
 from hybridsim.engine.native.kernels import Precompiled
 from hybridsim.engine.native.simd.products import LANES, filled_up
@@ -216,6 +216,7 @@ def of_matrices(
         _write_atoms(*atoms, rows.all)
     scratch = np.empty(widest, dtype=complex)
     _write_tables(A[first:], guards[first:], n, usable[first:], flows, scratch, rows.part(first, count))
+    release(flows)
     return rows.part(0, count), rows
 
 
@@ -249,7 +250,8 @@ class TableCache(dict[tuple[Any, ...], Made]):
         with _lock:
             for other in [k for k, one in self.items() if one is replaced] if replaced is not None else ():
                 self.discard(other)
-            self.discard(key)
+            if key in self:
+                self.discard(key)
             self[key] = made
             self.size += made.rows.size
             while len(self) > _MAX_CACHED or (len(self) > 1 and self.size > _MAX_BYTES):

@@ -39,6 +39,12 @@ if ENABLED:
             return array
 
 
+def release(pack: Any) -> None:
+    """Return the arrays of a pack to their layout, whose next `zeros` uses them again; nothing else may use them."""
+    if ENABLED:
+        pack._layout.take_back_pack(pack)
+
+
 ALIGNED = 64  # bytes; suitable for numbers of any kind
 _LARGE, LARGEST = 1 << 18, 1 << 21  # bytes of blocks that go through a pool
 _RETURNED = 2  # first blocks that a layout keeps for reuse
@@ -95,6 +101,7 @@ class ArrayLayout:
             self._types.append((type_of_fields(kind, tuple(form[:count])), 8 * SLOTS_PER_ARRAY * count))
             del form[:count]
         self._returned: list[np.ndarray] = []
+        self._released: list[Any] = []  # packs
         self._from_the_first = np.zeros(len(fields), dtype=np.int64)
         self._lay_out, self._lay_out_rest = Precompiled(_lay_out), Precompiled(_lay_out)  # of as many blocks
 
@@ -132,13 +139,23 @@ class ArrayLayout:
 
     def zeros(self) -> Any:
         """Return new arrays of zeros as a pack, for a layout of one named tuple in one block."""
-        blocks = (self._block(0),)
+        try:
+            pack = self._released.pop()
+            pack._blocks[0].fill(0)
+            return pack
+        except IndexError:  # there is none
+            blocks = (self._block(0),)
         blocks[0].fill(0)
         if not ENABLED:
             return self._kinds[0][0](*self.rows(blocks))
         table = np.empty_like(self._entries)
         address = self._lay_out(self._entries, self._steps, self._owners, self._from_the_first, blocks, table)
         return LayoutPack(self, blocks, table, self._types[0][0], address)
+
+    def take_back_pack(self, pack: Any) -> None:
+        """Store a pack of small arrays, which `release` returns."""
+        if len(self._released) < _RETURNED and self._sizes[0] < _LARGE:
+            self._released.append(pack)
 
     def __contains__(self, name: str) -> bool:
         return name in self._specs
