@@ -271,7 +271,7 @@ class SegmentRun:
         self.refused = abs(step.s1)
         self.counters.rejected += 1
         self.last_step = SHORTER * self.refused
-        self.tolerances = replace(self.tolerances, first_step=self.last_step)
+        self.tolerances = self.tolerances._replace(first_step=self.last_step)
         self.stepper = self._start(self.bound, self.last_step)
         return self.stepper.step()
 

@@ -105,6 +105,9 @@ class _Frame:
         self.names: tuple[str, ...] = tuple(s.name for s in model.states)
         self.n = len(self.names)
         self.layout = Layout(len(model.parameters), len(model.discrete), data["rates"], len(model.inputs))
+        # the run-time vector behind the parameters, before a segment
+        self.beyond_parameters = [0.0] * (self.layout.size - self.layout.parameters)
+        self.beyond_parameters[self.layout.pin_at - self.layout.parameters] = 1.0
         self.automata: tuple[Automaton, ...] = tuple(
             _automaton(c, g) for c, g in zip(model.all_components(), data["guards"], strict=True)
         )
@@ -189,15 +192,17 @@ class System(_Frame):
         self.code = compiled(model)
         vars(self).update(vars(_frame_of(self)))
         self.values = model.parameter_values()
-        self._base = np.zeros(self.layout.size)
-        self._base[: self.layout.parameters] = list(self.values.values())
-        self._base[self.layout.pin_at] = 1.0
+        self._base = np.array([*self.values.values(), *self.beyond_parameters])
         self.rates = self.rates_at(self._base)
         rates = self.rates.tolist()
         self.fastest = max(map(abs, rates), default=0.0)
         self._turning = tuple(enumerate(rates, self.layout.phases_at))
-        numbers = {**model.discrete_values(), **constant_inputs(model), **self.values} if model.inputs else {}
-        self.signals = tuple(Signal(i, numbers) for i in model.inputs)
+        self._start, discrete = model.start_values(), model.discrete_values() if model.discrete else {}
+        self.discrete_start = np.array([*discrete.values()])  # in the order of the state vector
+        self.signals: tuple[Signal, ...] = ()
+        if model.inputs:
+            numbers = {**discrete, **constant_inputs(model), **self.values}
+            self.signals = tuple(Signal(i, numbers) for i in model.inputs)
         self.starts: dict[tuple[Any, ...], Any] = {}  # cache of `hybridsim.engine.events.start`
         self.tables: dict[tuple[float, bool], Any] = {}  # cache of `hybridsim.engine.linear.tables`
         self.with_corners: Any = None  # cache of `hybridsim.engine.events.monitor_corners`
@@ -240,16 +245,6 @@ class System(_Frame):
         """Return the initial states in the order of the state vector."""
         values = {**self._start, **overrides}
         return np.array([values[n] for n in self.names], dtype=float)
-
-    @cached_property
-    def _start(self) -> dict[str, float]:
-        return self.model.start_values()
-
-    @cached_property
-    def discrete_start(self) -> np.ndarray:
-        """Return the initial discrete states in the order of the state vector."""
-        values = self.model.discrete_values()
-        return np.array([values[d.name] for d in self.model.discrete], dtype=float)
 
     def vector(self, origin: Instant, discrete: np.ndarray, forward: bool = True) -> np.ndarray:
         """Return the run-time vector of a segment whose local time starts at `origin`."""
