@@ -147,12 +147,12 @@ templates_of = per_structure(lambda system: dict[bytes, list[MatrixTemplate]]())
 
 def template_of(system: System, met: np.ndarray, p: np.ndarray) -> tuple[MatrixTemplate, np.ndarray]:
     """Return the matrix template of some modes that is valid at the parameters `p`, and its registers."""
-    cached = templates_of(system)
+    cached, key = templates_of(system), met.tobytes()
     inputs = p[: system.layout.parameters]
     with _lock:
-        while len(cached) >= _MAX_MODE_SETS and met.tobytes() not in cached:
+        while len(cached) >= _MAX_MODE_SETS and key not in cached:
             del cached[next(iter(cached))]
-        templates = cached.setdefault(met.tobytes(), [])
+        templates = cached.setdefault(key, [])
         found = _that_holds(templates, inputs)
         if found is None:
             begun = _begun(cached, met, inputs)
@@ -175,9 +175,11 @@ def _that_holds(
     templates: Iterable[MatrixTemplate], inputs: np.ndarray
 ) -> tuple[MatrixTemplate, np.ndarray] | None:
     """Return the first template that is valid for the given inputs, and its registers."""
-    return next(
-        (found for template in templates if (found := _with_values(template, inputs)) is not None), None
-    )
+    for template in templates:
+        registers = template.recipe.values(inputs)
+        if registers is not None:
+            return template, registers
+    return None
 
 
 def _begun(

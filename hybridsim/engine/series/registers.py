@@ -72,4 +72,8 @@ class Registers:
         """Write the parameters in the run-time vector p and their roundoff to the values of `rounded` inputs."""
         known: Inputs = self.inputs
         numbers, first = p[known.sources], len(known.constants)
-        values[first:, 0], values[first:, 1] = numbers, list(map(own_roundoff, numbers.tolist()))
+        former = values[first:, 0].tolist()
+        values[first:, 0] = numbers
+        for k, (number, old) in enumerate(zip(numbers.tolist(), former, strict=True), first):
+            if number != old:
+                values[k, 1] = own_roundoff(number)

@@ -244,10 +244,10 @@ class Model(Declared):
             former = parameters[positions[name]]
             parameters[positions[name]] = changed = former.with_value(changed_value(changes, name))
             are_numbers = are_numbers and former.value.is_constant and changed.value.is_number
-        copy = self._valued(parameters=tuple(parameters))
-        if are_numbers:
-            vars(copy).update(_unnumbered=self._unnumbered, _renumbered=self._renumbered.union(changes))
-        return copy
+        if not are_numbers:
+            return self._valued(parameters=tuple(parameters))
+        known = {"_unnumbered": self._unnumbered, "_renumbered": self._renumbered.union(changes)}
+        return self._valued(parameters=tuple(parameters), **known)
 
     def with_start(self, /, **changes: Expression | str | float) -> Model:
         """Return a copy with changed initial values of (discrete) states: ``model.with_start(x=0.1)``."""
@@ -284,9 +284,11 @@ class Model(Declared):
     def _valued(self, **parts: Any) -> Model:
         """Return a copy that differs only in values and shares all other results with the model."""
         copy: Model = object.__new__(type(self))
-        vars(copy).update(vars(self), **parts, _common=self._common)
+        known, _ = vars(copy), self._common  # which both models share
+        known.update(vars(self))
         for name in ("_values", "_renumbered", "_unnumbered"):
-            vars(copy).pop(name, None)
+            known.pop(name, None)
+        known.update(parts)
         return copy
 
     @cached_property
