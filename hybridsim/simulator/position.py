@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from copy import copy
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -29,8 +29,7 @@ from hybridsim.solution.poles import end_at_pole
 from hybridsim.solution.run import Run
 
 
-@dataclass(frozen=True)
-class Position:
+class Position(NamedTuple):
     """The state of a simulator between two calls. It never changes; a call makes a new state.
 
     Parameters

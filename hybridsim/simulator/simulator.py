@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from os import PathLike
 from typing import Any
 
@@ -272,7 +271,7 @@ class Simulator(CurrentState):
         """Return the events that were not returned by earlier calls."""
         position = self._current
         if position.events:
-            self._position = replace(position, events=())
+            self._position = position._replace(events=())
         return position.events
 
     # -- copies ---------------------------------------------------------------------------------------------

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import accumulate
 from typing import Any, NamedTuple
 
@@ -29,7 +30,22 @@ class StateArrays(NamedTuple):
 _FIELDS = StateArrays._fields
 _ONE = np.ones(1, dtype=np.int64).view(float)[0]  # a double with the bits of the integer 1
 _INTEGERS = ("z", "sides", "orders")
-_View = tuple[tuple[int], np.dtype[Any], int]  # shape, dtype, and offset in bytes
+
+
+class _Layout:
+    """The places of the arrays in the memory of a state, in doubles."""
+
+    def __init__(self, lengths: Sequence[int]) -> None:
+        *begins, self.size = accumulate(map(filled_up, lengths), initial=0)
+        # shape, dtype, and offset in bytes
+        self.views = {
+            name: ((length,), np.dtype(np.int64 if name in _INTEGERS else float), 8 * begin)
+            for name, length, begin in zip(_FIELDS, lengths, begins, strict=True)
+        }
+        at = dict(zip(_FIELDS, begins, strict=True))
+        self.floors, self.judged = slice(at["floors"], at["z"]), slice(at["sides"], None)
+        self.not_zero = np.zeros(self.size - at["sides"])  # sides and orders if no guard is zero
+        self.not_zero[: at["orders"] - at["sides"]] = _ONE
 
 
 class HybridState:
@@ -46,8 +62,8 @@ class HybridState:
     sides: np.ndarray
     orders: np.ndarray
 
-    def __init__(self, memory: np.ndarray, views: dict[str, _View]) -> None:
-        self.memory, self._views = memory, views
+    def __init__(self, memory: np.ndarray, layout: _Layout) -> None:
+        self.memory, self._layout = memory, layout
 
     @classmethod
     def of(cls, outcome: Outcome, p: np.ndarray) -> HybridState:
@@ -55,12 +71,8 @@ class HybridState:
         fields = StateArrays(
             outcome.x, outcome.x_error, p, outcome.guard_floors, outcome.z, outcome.sides, outcome.orders
         )
-        begins = list(accumulate((filled_up(len(values)) for values in fields), initial=0))
-        views = {
-            name: ((len(values),), np.dtype(np.int64 if name in _INTEGERS else float), 8 * k)
-            for name, values, k in zip(_FIELDS, fields, begins, strict=False)
-        }
-        state = cls(np.zeros(begins[-1]), views)
+        layout = _Layout([len(values) for values in fields])
+        state = cls(np.zeros(layout.size), layout)
         for name, values in zip(_FIELDS, fields, strict=True):
             getattr(state, name)[:] = values
         return state
@@ -69,21 +81,19 @@ class HybridState:
         """Create the view of an array when the attribute is first read."""
         if name not in _FIELDS:
             raise AttributeError(name)
-        shape, dtype, offset = self._views[name]
+        shape, dtype, offset = self._layout.views[name]
         values: np.ndarray = np.ndarray(shape, dtype, self.memory, offset)
         setattr(self, name, values)
         return values
 
     def divide(self) -> None:
         """Make this state the start of a new segment in unchanged modes, at which no guard is zero."""
-        memory, views = self.memory, self._views  # views of arrays cost more than this
-        sides, orders = views["sides"][2] // 8, views["orders"][2] // 8
-        memory[views["floors"][2] // 8 : views["z"][2] // 8] = memory[orders:] = 0.0
-        memory[sides:orders] = _ONE
+        memory, layout = self.memory, self._layout  # views of arrays cost more than this
+        memory[layout.floors], memory[layout.judged] = 0.0, layout.not_zero
 
     def copy(self) -> HybridState:
         """Return a copy with its own memory."""
-        return HybridState(self.memory.copy(), self._views)
+        return HybridState(self.memory.copy(), self._layout)
 
     def packed(self) -> Any:
         """Return the arrays packed for kernels; the pack keeps the memory alive."""
@@ -93,7 +103,7 @@ class HybridState:
         """Return the state as an `Outcome` that shares its memory."""
         memory = self.memory
         x, x_error, p, floors, z, sides, orders = [
-            np.ndarray(shape, dtype, memory, offset) for shape, dtype, offset in self._views.values()
+            np.ndarray(shape, dtype, memory, offset) for shape, dtype, offset in self._layout.views.values()
         ]
         return Outcome(
             x, p, z, sides, orders, _NO_MONITORS, _NO_MONITORS, x_error, floors, _NO_MONITOR_FLOORS

@@ -127,8 +127,9 @@ class ResumePoint:
             return None
         counters = self.counters.copy()
         loop.count(run, counters)
-        looks = [work.steps // STEPS_PER_LOOK for work in (self.counters, counters)]  # for stiffness
-        is_looked_at = self.setup.method.stable_to and looks[0] < looks[1]
+        is_looked_at = self.setup.method.stable_to and (  # for stiffness
+            self.counters.steps // STEPS_PER_LOOK < counters.steps // STEPS_PER_LOOK
+        )
         if not run.is_at_target or run.has_news or run.events or not run.count or is_looked_at:
             loop.kernel_run = run
             return loop
