@@ -138,6 +138,19 @@ def test_models_do_not_pile_up(model: hs.Model) -> None:
     assert sum(ref() is not None for ref in left) <= 17
 
 
+def test_the_model_of_a_call_with_other_numbers_is_let_go_with_its_solution(model: hs.Model) -> None:
+    """No other call can have this model, so its system is not kept for later runs."""
+    simulator = hs.Simulator(model, integrator="exact")
+    for k, run in enumerate((hs.simulate, simulator.run)):
+        options = {"model": model, "integrator": "exact"} if run is hs.simulate else {}
+        hs.simulate(
+            model, SPAN, integrator="exact", params={"F0": 24.0}
+        )  # the tables of the structure keep one model
+        left = weakref.ref(run(t_span=SPAN, params={"F0": 25.0 + k}, **options).model)
+        gc.collect()
+        assert left() is None
+
+
 def test_runs_side_by_side_in_threads(model: hs.Model) -> None:
     """Scratch arrays are handed on from run to run, never shared by two at once."""
     starts = [{"v": 0.01 * k} for k in range(8)]

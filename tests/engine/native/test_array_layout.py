@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from hybridsim.engine.native.array_layout import ArrayLayout, BufferPool
-from hybridsim.engine.native.kernels import Precompiled, kernel
+from hybridsim.engine.native.array_layout import ArrayLayout, BufferPool, release
+from hybridsim.engine.native.kernels import ENABLED, Precompiled, kernel
 from hybridsim.engine.native.struct_pack import packed
 
 
@@ -94,6 +94,18 @@ def test_a_precompiled_kernel_is_the_same_kernel() -> None:
     precompiled = Precompiled(_number)
     assert [precompiled(packed(arrays)), precompiled(packed(arrays))] == [103, 103]
     assert arrays.numbers.tolist() == [[0.0, 1.0], [2.0, 3.0]]
+
+
+@pytest.mark.skipif(not ENABLED, reason="without the compiler arrays are no packs")
+def test_arrays_that_are_released_are_the_next_zeros() -> None:
+    array_layout = ArrayLayout((Rows,), [(dtype, shape, 0) for dtype, shape, _ in FIELDS])
+    first = array_layout.zeros()
+    assert _number(first) == 506
+    assert first.words.tolist() == [10, 11, 12, 13, 14, 15]
+    release(first)
+    again, other = array_layout.zeros(), array_layout.zeros()
+    assert again.address == first.address != other.address
+    assert not again.numbers.any() and not again.words.any() and not other.numbers.any()
 
 
 def test_a_block_that_is_taken_back_is_the_next_one() -> None:
