@@ -71,14 +71,12 @@ class MatrixTemplate:
         used = sorted({a for m in monomials for a, _ in m})
         met_atoms = [atoms.known[a] for a in used]
         terms = [term for a in met_atoms for term in a.terms]
-        self._computed = [
-            np.array([numbers.place(value) for value in values], dtype=np.int64)
-            for values in (
-                [a.rate for a in met_atoms],
-                [a.offset for a in met_atoms],
-                [weight for _, weight in terms],
-            )
+        computed = [
+            *(a.rate for a in met_atoms),
+            *(a.offset for a in met_atoms),
+            *(weight for _, weight in terms),
         ]
+        self._computed = np.array([numbers.place(value) for value in computed], dtype=np.int64)
         self._fixed = (
             np.array([a.kind for a in met_atoms], dtype=np.int64),
             np.cumsum([0, *(len(a.terms) for a in met_atoms)]).astype(np.int64),
@@ -116,7 +114,8 @@ class MatrixTemplate:
         The last array is the range of angles in the run-time vector.
         """
         kinds, term_start, sources, factors, angles = self._fixed
-        rates, offsets, weights = (registers.take(positions, -1) for positions in self._computed)
+        found, count = registers.take(self._computed, -1), len(kinds)
+        rates, offsets, weights = found[..., :count], found[..., count : 2 * count], found[..., 2 * count :]
         return kinds, rates, offsets, term_start, sources, weights, factors, angles
 
 

@@ -21,7 +21,8 @@ from hybridsim.engine.system.per_structure import per_structure, spare_scratch
 from hybridsim.engine.system.system import System
 from hybridsim.forks import SharedLock
 
-_MAX_CACHED = 16  # most tables per structure, one for each set of parameter values
+# most tables per structure, one for each set of parameter values; a longer cache would have cold memory for new tables
+_MAX_CACHED = 4
 _MAX_BYTES = 1 << 26  # most bytes of all these tables except the last
 
 
