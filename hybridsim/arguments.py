@@ -273,9 +273,8 @@ def step_bound(value: Any, name: str) -> float:
 
 def absolute_tolerances(model: Model, atol: Any, rtol: float, start: np.ndarray) -> np.ndarray:
     """Return atol for each state; the default is rtol * 1e-3 * nominal size."""
-    small = 1e-3 * rtol
     sizes = zip(model.states, start.tolist(), strict=True)
-    values = np.array([small * (state.nominal or abs(x) or 1.0) for state, x in sizes])
+    values = np.array([1e-3 * rtol * (state.nominal or abs(x) or 1.0) for state, x in sizes])
     if atol is None:
         return values
     names = [s.name for s in model.states]
