@@ -21,7 +21,8 @@ from hybridsim.engine.system.per_structure import per_structure, spare_scratch
 from hybridsim.engine.system.system import System
 from hybridsim.forks import SharedLock
 
-# most tables per structure, one for each set of parameter values; a longer cache would have cold memory for new tables
+# most tables per structure, one for each set of parameter values; the memory of discarded tables is reused while it is
+# still in the cache of the processor
 _MAX_CACHED = 4
 _MAX_BYTES = 1 << 26  # most bytes of all these tables except the last
 
