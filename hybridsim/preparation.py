@@ -45,6 +45,14 @@ def _run_key(t_span: Any, settings: tuple[Any, ...]) -> tuple[Any, ...] | None:
     return run_key if _PLAIN.issuperset(map(type, run_key)) else None
 
 
+class Values(NamedTuple):
+    """The values that replace those of the model in a run, as in `simulate`."""
+
+    params: Any = None
+    x0: Any = None
+    z0: Any = None
+
+
 class _Settings(NamedTuple):
     """The settings of a run that do not depend on numbers of the model; they are checked once for each structure."""
 
@@ -81,10 +89,8 @@ def _store_settings(model: Model, key: tuple[Any, ...], settings: _Settings) -> 
 def prepared(
     model: Model,
     t_span: Any,
+    values: Values,
     *,
-    params: Any,
-    x0: Any,
-    z0: Any,
     integrator: Any,
     rtol: Any,
     atol: Any,
@@ -101,6 +107,7 @@ def prepared(
     if options:  # an integer option rejects 16.0, which equals 16
         every_argument += (*chain(*options.items()), *(type(value).__name__ for value in options.values()))
     key = _run_key(t_span, every_argument)
+    params, x0, z0 = values
     run_key = key if params is x0 is z0 is limits is None else None
     if run_key is not None:
         run = runs_of(model).get(run_key)

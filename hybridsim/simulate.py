@@ -136,7 +136,7 @@ def simulate(
             model, t_span, x0=x0, integrator=integrator, rtol=rtol, atol=atol, max_step=max_step, t_eval=t_eval,
             keep=keep, limits=limits, progress=progress, params=params, z0=z0, first_step=first_step, **options,
         )  # fmt: skip
-    from hybridsim.preparation import prepared
+    from hybridsim.preparation import Values, prepared
     from hybridsim.solution.running import carried_out
 
     model = arguments.chosen_model(model, None)
@@ -144,9 +144,7 @@ def simulate(
     run, compile_time = prepared(
         model,
         t_span,
-        params=params,
-        x0=x0,
-        z0=z0,
+        Values(params, x0, z0),
         integrator=integrator,
         rtol=rtol,
         atol=atol,

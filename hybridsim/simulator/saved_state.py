@@ -8,7 +8,7 @@ from typing import Any
 from hybridsim.errors import UsageError
 from hybridsim.integrators.automatic import successor_of
 from hybridsim.model import Model
-from hybridsim.preparation import prepared
+from hybridsim.preparation import Values, prepared
 from hybridsim.simulate import KEYWORDS
 from hybridsim.simulator.position import Position, stepped
 
@@ -90,9 +90,8 @@ def _unpickled(
     (name, options, reason), (t0, x0, z0, discrete, tolerances) = method, begin
     checkpoint, counters, warnings, events, ended = rest
     run, _ = prepared(
-        model_of(source), (t0, t0), params=None, x0=None, z0=None, integrator=name, rtol=None, atol=None,
-        max_step=float("inf"), first_step=None, t_eval=None, save="events", limits=None, options=options,
-        keywords=KEYWORDS,
+        model_of(source), (t0, t0), Values(), integrator=name, rtol=None, atol=None, max_step=float("inf"),
+        first_step=None, t_eval=None, save="events", limits=None, options=options, keywords=KEYWORDS,
     )  # fmt: skip
     successor = successor_of(name, run.system) if reason else None
     task = replace(run.task, x0=x0, z0=z0, discrete=discrete, tolerances=tolerances, successor=successor)

@@ -14,7 +14,7 @@ from hybridsim.calls import refusing
 from hybridsim.errors import UsageError, nearest
 from hybridsim.mechanics.declaration.system import MechanicalSystem
 from hybridsim.model import Model
-from hybridsim.preparation import prepared
+from hybridsim.preparation import Values, prepared
 from hybridsim.simulate import ALL_PARTS, KEYWORDS, simulate
 from hybridsim.simulator.current_state import CurrentState
 from hybridsim.simulator.ownership import Ownership
@@ -86,16 +86,16 @@ class Simulator(CurrentState):
             "integrator": integrator, "rtol": rtol, "atol": atol, "max_step": max_step, "first_step": first_step,
         }  # fmt: skip
         self._options = options
-        self._prepared((0.0, 0.0), None, None, None)  # checks the arguments, and binds the model once
+        self._prepared((0.0, 0.0), Values())  # checks the arguments, and binds the model once
         self._position: Position | None = None
         self._first: Position | None = None  # just after the last start
         self._mine = Ownership(self.model.name)
 
-    def _prepared(self, t_span: tuple[float, float], params: Any, x0: Any, z0: Any) -> Run:
+    def _prepared(self, t_span: tuple[float, float], values: Values) -> Run:
         """Return a prepared run with the settings of the simulator."""
         run, _ = prepared(
-            self.model, t_span, params=params, x0=x0, z0=z0, t_eval=None, save="events", limits=None,
-            options=self._options, keywords=KEYWORDS, **self._settings,
+            self.model, t_span, values, t_eval=None, save="events", limits=None, options=self._options,
+            keywords=KEYWORDS, **self._settings,
         )  # fmt: skip
         return run
 
@@ -175,7 +175,7 @@ class Simulator(CurrentState):
         """
         with self._mine("start"):
             begin = arguments.finite_number(t0, "t0")
-            begun(self._prepared((begin, begin), params, x0, z0), self._commit)
+            begun(self._prepared((begin, begin), Values(params, x0, z0)), self._commit)
             found = self._taken()
             self._first = self._position
             return found
