@@ -114,14 +114,14 @@ def prepared(
         if run is not None and type(run.method) is integrator_class(run.method.name):  # still registered
             span = run.task.t0, run.task.t1
             return run.on_grid(arguments.time_grid(t_eval, span, run.task.retention, save)), 0.0
-    given, (x0_states, model) = model, arguments.start_values(arguments.chosen_model(model, params), x0)
+    original, (x0_states, model) = model, arguments.start_values(arguments.chosen_model(model, params), x0)
     known = _known_settings(model, key)
     span = arguments.time_span(t_span) if known is None else known.span
     announce_compilation()
     name = arguments.integrator_name(integrator)
     began = time.perf_counter()
     # only a model that the caller has can come again
-    system, reason = system_of(model) if model is given else bound(model), ""
+    system, reason = system_of(model) if model is original else bound(model), ""
     modes, start = arguments.initial_modes(system, z0), system.start_state(x0_states)
     if known is not None:
         method = known.method
