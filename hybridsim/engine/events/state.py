@@ -43,7 +43,7 @@ class _Layout:
             for name, length, begin in zip(_FIELDS, lengths, begins, strict=True)
         }
         at = dict(zip(_FIELDS, begins, strict=True))
-        self.floors, self.judged = slice(at["floors"], at["z"]), slice(at["sides"], None)
+        self.floors, self.tail = slice(at["floors"], at["z"]), slice(at["sides"], None)
         self.not_zero = np.zeros(self.size - at["sides"])  # sides and orders if no guard is zero
         self.not_zero[: at["orders"] - at["sides"]] = _ONE
 
@@ -89,7 +89,7 @@ class HybridState:
     def divide(self) -> None:
         """Make this state the start of a new segment in unchanged modes, at which no guard is zero."""
         memory, layout = self.memory, self._layout  # views of arrays cost more than this
-        memory[layout.floors], memory[layout.judged] = 0.0, layout.not_zero
+        memory[layout.floors], memory[layout.tail] = 0.0, layout.not_zero
 
     def copy(self) -> HybridState:
         """Return a copy with its own memory."""
