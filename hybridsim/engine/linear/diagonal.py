@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from functools import lru_cache
+from typing import Any, NamedTuple
 
+import numpy as np
+
+from hybridsim.engine.native.array_layout import ArrayLayout
 from hybridsim.engine.native.kernels import kernel
 
 CONDITION = 1e2  # largest condition of the basis: factor of rounding errors in a change of basis
@@ -15,9 +19,29 @@ _SLOWEST = 4.0  # product with the horizon; the run time is 1 to 1/16 of the hor
 _SWEEPS = 8  # most sweeps of balancing
 
 
+class Balanced(NamedTuple):
+    """Balanced matrices of which the block diagonal forms are computed, and what is known of their eigenvectors."""
+
+    scales: np.ndarray  # (K, m) the diagonal D
+    balanced: np.ndarray  # (K, m, m) D^-1 A D
+    basis: np.ndarray  # (K, m, m) real and imaginary parts of the eigenvectors; before that scratch
+    counts: np.ndarray  # (K,) number of coordinates
+    is_diagonal: np.ndarray  # (K,) whether the eigenvectors are a good basis
+    are_right: np.ndarray  # (K,) whether they are accurate
+
+
+@lru_cache(64)
+def layout_of_balanced(count: int, size: int) -> ArrayLayout:
+    """Return the layout of `Balanced` for matrices (count, size, size)."""
+    fields: list[tuple[Any, tuple[int, ...]]] = [
+        (float, (size,)), (float, (size, size)), (float, (size, size)), (np.int64, ()), (np.bool_, ()), (np.bool_, ()),
+    ]  # fmt: skip
+    return ArrayLayout((Balanced,), [(dtype, (count, *shape), 0) for dtype, shape in fields])
+
+
 @kernel
 def balance(A: Any, horizon: float, found: Any) -> None:
-    """Balance matrices A by diagonals D of powers of two, and write them to `found` (`Balanced` of `modal`).
+    """Balance matrices A by diagonals D of powers of two, and write them to `found` (`Balanced`).
 
     The method is that of E. E. Osborne, J. ACM 7 (1960) 338.
 

@@ -17,8 +17,10 @@ import numpy as np
 
 from hybridsim.engine.linear.diagonal import (
     CONDITION,
+    Balanced,
     balance,
     check_eigenvectors,
+    layout_of_balanced,
     real_columns,
     write_diagonal,
 )
@@ -93,17 +95,6 @@ class Modals(NamedTuple):
     powers: np.ndarray  # (K, J) |B**exponent| of the block of each coordinate, for the requested exponent
 
 
-class Balanced(NamedTuple):
-    """Balanced matrices of which the block diagonal forms are computed, and what is known of their eigenvectors."""
-
-    scales: np.ndarray  # (K, m) the diagonal D
-    balanced: np.ndarray  # (K, m, m) D^-1 A D
-    basis: np.ndarray  # (K, m, m) real and imaginary parts of the eigenvectors; before that scratch
-    counts: np.ndarray  # (K,) number of coordinates
-    is_diagonal: np.ndarray  # (K,) whether the eigenvectors are a good basis
-    are_right: np.ndarray  # (K,) whether they are accurate
-
-
 def modal(A: np.ndarray, horizon: float = math.inf) -> Modal:
     """Return the block diagonal form of a square real matrix (m, m), for times up to about `horizon`."""
     found, _ = modals(np.ascontiguousarray(A[None]), horizon)
@@ -115,7 +106,7 @@ def modals(
 ) -> tuple[Modals, int]:
     """Return the block diagonal forms of many matrices (K, m, m), padded to a common size, as a pack, and this size."""
     count, size, others = *A.shape[:2], {}
-    found: Balanced = _layout_of_balanced(count, size).zeros()
+    found: Balanced = layout_of_balanced(count, size).zeros()
     _balance(A, horizon, found)
     with np.errstate(all="ignore"):
         values, vectors = eigenvectors(found.balanced)
@@ -137,15 +128,6 @@ def modals(
         for name, part in zip(Modals._fields[1:], fields, strict=True):
             getattr(result, name)[k][tuple(slice(0, m) for m in part.shape)] = part
     return result, widest
-
-
-@lru_cache(64)
-def _layout_of_balanced(count: int, size: int) -> ArrayLayout:
-    """Return the layout of `Balanced` for matrices (count, size, size)."""
-    fields: list[tuple[Any, tuple[int, ...]]] = [
-        (float, (size,)), (float, (size, size)), (float, (size, size)), (np.int64, ()), (np.bool_, ()), (np.bool_, ()),
-    ]  # fmt: skip
-    return ArrayLayout((Balanced,), [(dtype, (count, *shape), 0) for dtype, shape in fields])
 
 
 @lru_cache(64)
