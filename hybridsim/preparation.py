@@ -146,7 +146,7 @@ def prepared(
             arguments.relative_tolerance(rtol),
             arguments.step_bound(max_step, "max_step"),
             None if first_step is None else arguments.step_bound(first_step, "first_step"),
-            None if save == "last-period" else arguments.retention_of(save, system),
+            None if isinstance(save, str) and save == "last-period" else arguments.retention_of(save, system),
         )
         refuse_endless(known.longest, span, "max_step")
         if key is not None and integrator != "auto":
