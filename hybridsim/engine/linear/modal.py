@@ -122,11 +122,11 @@ def modals(
     widest = -(-max(most, least) // multiple) * multiple
     result: Modals = _layout(count, size, widest).zeros()
     _diagonal(values, vectors, inverses, exponent, found, result)
-    release(found)
     for k, flow in others.items():
         fields = (*vars(flow).values(), flow.power(exponent))
         for name, part in zip(Modals._fields[1:], fields, strict=True):
             getattr(result, name)[k][tuple(slice(0, m) for m in part.shape)] = part
+    release(found)
     return result, widest
 
 
