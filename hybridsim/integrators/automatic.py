@@ -68,7 +68,7 @@ def choose(system: System, x0: np.ndarray, z0: np.ndarray, span: tuple[float, fl
 
 
 def _monitors_for_python(system: System) -> str:
-    """Return which monitors keep `exact` from running in compiled code, or an empty text."""
+    """Name the monitors that prevent `exact` from running in compiled code; return an empty text if there are none."""
     if not system.monitor_names:
         return ""
     corners = corners_of_monitors(system)

@@ -159,7 +159,7 @@ class Integrator(metaclass=_IntegratorType):
 
     @property
     def rounding(self) -> float:
-        """Return a bound of the rounding error of a step, relative to the roundoff of the state change."""
+        """Return the largest possible rounding error of a step, as a multiple of the rounding of its result."""
         return 100.0
 
     def prepare(self, system: System) -> None:
@@ -175,7 +175,7 @@ class Integrator(metaclass=_IntegratorType):
         first_step: float | None,
         watch: Watch,
     ) -> Stepper:
-        """Begin a smooth segment."""
+        """Begin to integrate the motion up to the next event."""
         raise NotImplementedError(f"{self.name} has no start(), because the method run() takes all steps")
 
     def compiled_loop(self, system: System, tolerances: Tolerances, longest: float) -> CompiledLoop | None:

@@ -85,7 +85,7 @@ def changes(
 
 
 class FirstSteps:
-    """Take steps of DOP853 until each hidden guard exceeds its error, then steps of the multistep method.
+    """Take steps of DOP853 until each guard that starts at zero exceeds its error, then steps of a multistep method.
 
     A multistep method begins at order one with errors of the size of its tolerance. A gap that opens with the cube of
     time would seem to close again, and of bounces that accumulate the last ones would be lost.

@@ -78,7 +78,7 @@ def _is_small(value: Any, most: float) -> bool:
 
 
 def kind_description(kind: Any) -> str:
-    """Return an annotation as text for users."""
+    """Describe the type annotation of an option in words, such as "a whole number"."""
     if get_origin(kind) is Literal:
         return "one of " + ", ".join(map(str, get_args(kind)))
     if get_origin(kind) in (Union, UnionType):

@@ -1,4 +1,4 @@
-"""This module contains the base class and the kernels of compiled methods with polynomial dense output.
+"""This module contains the base class and compiled functions for methods with polynomial dense output.
 
 A segment kernel takes steps and fits a polynomial to each. The kernels here begin a segment, find the first zero of a
 guard along a polynomial, compute guards at the end of a step, and write the end of the segment for the event loop.
@@ -100,7 +100,7 @@ class PolynomialKernels(MethodKernels):
         """Return a named tuple of the arrays that the method needs for one call."""
 
     def arrays(self) -> PolynomialArrays:
-        """Return new arrays of the kernel for one call, as a pack."""
+        """Return new arrays for one call of the compiled loop."""
         system, n, columns = self.system, self.system.n, self.order + 1
         tapes, guards, whole = tape_cache_of(system).tapes, system.guard_count, np.int64
         arrays: PolynomialArrays = packed(
@@ -134,7 +134,7 @@ class PolynomialKernels(MethodKernels):
         return (float, (2,)), (float, (self.system.n, self.degree + 1))
 
     def begin(self, own: PolynomialArrays, tapes: Tapes) -> Any:
-        """Write the settings of the run to the arrays before a call. Return the arrays."""
+        """Write the settings of the run to the arrays, and return the arrays."""
         own.control[RTOL], own.control[MAX_STEP] = self.tolerances.rtol, self.tolerances.max_step
         own.atol[:], own.counts[:] = self.tolerances.atol, 0
         return replaced(own, parts=self.parts.of(tapes), codes=self.codes.of(tapes))
@@ -150,7 +150,7 @@ class PolynomialKernels(MethodKernels):
         counters.rejected += result[REJECTED]
 
     def block(self, result: Any, rows: StepRows, last_steps: np.ndarray, *record: np.ndarray) -> SeriesBlock:
-        """Return the committed segments of a call."""
+        """Return the segments that one call of the compiled loop has stored."""
         return SeriesBlock(self.recorded, last_steps, *rows, *record)
 
 
@@ -172,7 +172,7 @@ def put_sides(state: Any, own: Any) -> None:
 
 @inlined
 def begin_segment(start: Any, model: Any, call: Any, state: Any, work: Any, own: Any) -> bool:
-    """Begin a segment with its states in ``work.y``; return False if the last segment was rejected."""
+    """Prepare the integration up to the next event from the states in ``work.y``; return False after a rejection."""
     tapes, inputs, k = model.tapes, model.inputs, start.mode_row
     load_constants(inputs, tapes, k, state.p, own.V)
     load_constants(inputs, tapes, k, state.p, own.W)
@@ -189,7 +189,7 @@ def begin_segment(start: Any, model: Any, call: Any, state: Any, work: Any, own:
 
 @inlined
 def next_step(call: Any, own: Any, rows: Any, s: float) -> int:
-    """Return CONTINUES, or the outcome of the segment if it has to end at s before the next step."""
+    """Return CONTINUES, or a reason to leave the segment at the local time s."""
     taken = own.counts[TAKEN]
     if s > call.longest[0]:
         return STOPPED
@@ -200,7 +200,7 @@ def next_step(call: Any, own: Any, rows: Any, s: float) -> int:
 
 @inlined
 def first_zero(start: Any, model: Any, own: Any, s: float, d: float) -> tuple[int, int, float]:
-    """Find the first zero of an active guard along ``own.polynomial`` from s to s + d.
+    """Find the first zero of an active guard between the local times s and s + d.
 
     Return (FOUND, number among the active guards, time since s), (NEVER, -1, d), or OPEN if zeros are not certain.
     """
@@ -250,7 +250,7 @@ def guards_at_end(start: Any, model: Any, own: Any, s: float, x: Any) -> None:
 
 @inlined
 def record_step(call: Any, work: Any, own: Any, rows: Any, s: float, d: float, end: Any) -> None:
-    """Write the step from s to s + d to the record, and its end to ``work.y``."""
+    """Store the step from s to s + d, and copy its end to ``work.y``."""
     row = call.int_slots[STEPS] + own.counts[TAKEN]
     own.counts[TAKEN] += 1
     put(end, work.y)
@@ -265,7 +265,7 @@ def record_step(call: Any, work: Any, own: Any, rows: Any, s: float, d: float, e
 def end_segment(
     start: Any, model: Any, call: Any, state: Any, work: Any, own: Any, s: float, length: float, number: int
 ) -> SegmentEnd:
-    """Return the end of a segment at s, with the states in ``work.y``; `length` is the length of the last step.
+    """Return the end of a segment at the local time s, with the states in ``work.y``.
 
     number: of the active guard that is zero there, -1 for none. ``own.guards`` belong to this end if there is one.
     """

@@ -59,7 +59,7 @@ def load(scene: Scene) -> Any:
 
 
 def model_of(scene: Scene, form: str, settings: dict[str, Any]) -> Any:
-    """Return the model to run: the scene's model, or its regularized form with the setting v0 as width."""
+    """Return the model of a scene, or a regularized form of the model with the width `settings["v0"]`."""
     model = load(scene)
     return model.regularized(form, v0=settings.pop("v0")) if form else model
 

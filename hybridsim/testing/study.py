@@ -90,7 +90,7 @@ def option_names(one: Any) -> set[str]:
 
 
 def lacking(one: type[Integrator]) -> dict[str, str]:
-    """Return the limitations of an integrator that remain with the options of its study."""
+    """Return the limitations of an integrator that the options of its study do not remove."""
     lifted = {capability for option, (_, capability) in LIFTED.items() if option in option_names(one)}
     return {capability: reason for capability, reason in one.lacks.items() if capability not in lifted}
 
@@ -171,7 +171,7 @@ def carry_out(
 
 
 def cut_short(tolerances: tuple[float, float], last: Setting) -> tuple[float, float]:
-    """Return the allowed errors of a study whose last setting is the given setting."""
+    """Return the allowed errors of a study that ends early, at the given setting."""
     allowed = CUT_SHORT * last.options.get("rtol", 0.0)
     return max(tolerances[0], allowed), max(tolerances[1], allowed)
 

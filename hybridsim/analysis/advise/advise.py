@@ -229,7 +229,7 @@ class _ProgressReport:
         self.again()
 
     def again(self) -> None:
-        """Repeat the last report, unless the last report is very recent."""
+        """Repeat the last progress report, unless it is very recent."""
         if self._progress is not None and time.monotonic() >= self._next:
             self._next = time.monotonic() + _PAUSE
             self._progress(self._done, self._total, self._what)

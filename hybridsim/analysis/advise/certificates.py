@@ -134,7 +134,7 @@ def _at(form: Affine, start: Mapping[str, float]) -> float:
 
 
 def _largest(model: Model, form: Affine, force: str, values: Mapping[str, float]) -> float:
-    """Return an upper bound of |form| over all times, with the contact's force set to zero in the linear form."""
+    """Return an upper bound over all times for the absolute value of an affine form, without the contact's force."""
     steady, swing = form.constant, sum(abs(phasor) for phasor in form.waves.values())
     inputs = {i.name: i for i in model.inputs}
     for name, value in form.linear.items():

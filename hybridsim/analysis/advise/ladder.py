@@ -116,7 +116,7 @@ def duration(seconds: float) -> str:
 
 
 def scene_of(model: Model, motion: Any, v0: float | None) -> Scene:
-    """Return the full model with its sliding speeds, as the data that simplified models need."""
+    """Return the data from which simplified models are made: the full model and its sliding speeds."""
     if isinstance(motion, Measures):
         means, peak = speeds(model, motion)
         return Scene(model, means, peak or None, v0)
@@ -187,7 +187,7 @@ def _formula(rung: LadderStep, scene: Scene, question: Question, _: Watch | None
 
 
 def _without(rung: LadderStep, verdict: str, why: str, model: Model | None = None) -> Step:
-    """Return the result of a simplified model that has no value."""
+    """Return the entry for a simplified model without a computed value."""
     return Step(rung.name, rung.title, rung.drops, None, math.inf, math.nan, verdict, why, model)
 
 

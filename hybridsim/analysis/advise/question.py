@@ -102,7 +102,7 @@ class Question:
         return Answer(value, seconds, motion)
 
     def motion(self, model: Model, progress: Callable[[float], None] | None = None) -> Any:
-        """Return the steady state, or the run."""
+        """Return the steady state of a model, or its run over the time span of the question."""
         if self.t_span is None:
             steady = steady_state(model, tol=self.accuracy, progress=progress)
             if not steady.success:

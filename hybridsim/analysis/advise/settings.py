@@ -70,7 +70,7 @@ class Setting:
 
     @property
     def is_adequate(self) -> bool:
-        """Whether the setting computes the value within the tolerance."""
+        """Whether the setting computes the requested value within the tolerance."""
         return self.verdict == ADEQUATE
 
     @property
@@ -146,7 +146,7 @@ def settings(
 
 
 def rank(setting: Setting) -> tuple[bool, bool, float]:
-    """Return the sort key: adequate settings come first, then fast settings; the times of fixed steps are increased."""
+    """Return a sort key by which adequate settings come first, and fast settings come before slow ones."""
     worth = _UNCONTROLLED if "step" in setting.options else 1.0
     return not setting.is_adequate, math.isnan(setting.seconds), worth * setting.seconds
 

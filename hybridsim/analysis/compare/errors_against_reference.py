@@ -86,7 +86,7 @@ class Yardstick:
         return CompletedGraph(trajectory, jumps, self.period or t1 - t0, self.amplitude)
 
     def measure(self, run: Trajectory) -> Errors:
-        """Return the errors of a run that starts like the reference, until one of them ends."""
+        """Return the errors of a run up to its end or the end of the reference, whichever is earlier."""
         matched = match_events(self.trajectory, run)
         end = min(self.trajectory.t_span[1], run.t_span[1])
         shared = self.times <= end

@@ -68,7 +68,7 @@ class CompletedGraph:
         return self._refined(times, states, self._bound(times, states, end), end)
 
     def _bound(self, times: Array, states: Array, end: float) -> Array:
-        """Return an upper bound of each distance, computed from the graph at the same time and at nearby jumps."""
+        """Return upper bounds of the distances, from the graph at the same time and at nearby jumps."""
         inside = np.clip(times, self.trajectory.t_span[0], end)
         late = np.abs(times - inside) / self.time
         far = np.min([np.abs(self.at(inside, side) - states).max(axis=1) for side in "-+"], axis=0)
@@ -82,7 +82,7 @@ class CompletedGraph:
         return bound
 
     def _refined(self, times: Array, states: Array, bound: Array, end: float) -> Array:
-        """Return the distances, found by a search of the part of the graph that contains the nearest points."""
+        """Compute exact distances by a search of those parts of the graph that may contain the nearest points."""
         for _ in range(_ROUNDS):
             width = bound[:, None] * self.time
             knots = np.clip(times[:, None] + width * _WINDOW, self.trajectory.t_span[0], end)
@@ -103,7 +103,7 @@ class CompletedGraph:
         return bound
 
     def _to_segments(self, t: Array, x: Array, ta: Array, xa: Array, tb: Array, xb: Array) -> Array:
-        """Return the distance of points (t, x) from segments (ta, xa)-(tb, xb) in the maximum norm."""
+        """Return the maximum-norm distance of points (t, x) from line segments between (ta, xa) and (tb, xb)."""
         start = np.concatenate([((ta - t) / self.time)[..., None], xa - x], axis=-1)
         along = np.concatenate([((tb - ta) / self.time)[..., None], xb - xa], axis=-1)
         least = np.minimum(np.abs(start).max(axis=-1), np.abs(start + along).max(axis=-1))

@@ -74,7 +74,7 @@ def choose_series(
     steps: Sequence[int] | None = None,
     untimed_span: float | None = None,
 ) -> tuple[Series, ...]:
-    """Return the lines of a comparison.
+    """Return the series of runs of a comparison: an integrator or regularised law with its settings each.
 
     Parameters
     ----------

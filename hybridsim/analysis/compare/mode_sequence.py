@@ -44,7 +44,7 @@ class MatchedEvents:
 
 @dataclass(frozen=True)
 class _Entry:
-    """One element of a sequence: an event with its new mode, or the first mode, which has no event."""
+    """One element of a mode sequence: an event with its new mode, or the first mode, which has no event."""
 
     t: float
     label: str

@@ -37,7 +37,7 @@ def regularised_series(
     integrators: Sequence[str] | None = None,
     rtols: Sequence[float] | None = None,
 ) -> tuple[Series, ...]:
-    """Return lines over v0 for each regularised law and integrator, and lines with the set-valued law.
+    """Return series of runs with decreasing width v0 for each regularised law, and runs with the set-valued law.
 
     Parameters
     ----------

@@ -43,7 +43,7 @@ def fastest(rows: Iterable[Row]) -> Row | None:
 
 
 def cheapest(rows: Iterable[Row]) -> str:
-    """Return the fastest run with the right modes and a state error of at most `TARGET` as text."""
+    """Return a text that names the fastest run with the right modes and a state error of at most `TARGET`."""
     row = fastest(rows)
     if row is None or row.cost is None:
         return f"no run reaches {TARGET:.0e} with the right modes"

@@ -41,7 +41,7 @@ class Budget:
 
 @dataclass(frozen=True)
 class Entry:
-    """A scene, its reference, and the lines to run on the scene."""
+    """A scene with its reference and the series of runs to make on it."""
 
     case: PreparedCase
     reference: Reference
@@ -58,7 +58,7 @@ class _Run:
 def timed_rows(
     entries: Sequence[Entry], repeat: int, budget: Budget, step: Callable[[str], None]
 ) -> list[tuple[Row, ...]]:
-    """Make all runs, and return the rows of each entry in the order of its lines.
+    """Make all runs, and return the rows of each entry, sorted like its lines.
 
     First everything is run once, the loosest setting of every line before the second of any. The time of the
     next setting of a line is predicted from its last two. A run that would take more than ten times its equal

@@ -145,7 +145,7 @@ def continuation(
 
 
 class _Follower:
-    """Follows one branch step by step."""
+    """Follows one branch of periodic orbits step by step."""
 
     def __init__(
         self,
@@ -211,7 +211,7 @@ class _Follower:
         return self._closing(point, self._unknowns(point))
 
     def _at_bound(self, inside: BranchPoint, outside: BranchPoint) -> list[BranchPoint]:
-        """Return the orbit at the bound that lies between two points, or None if Newton's method fails."""
+        """Return the orbit at the parameter bound that lies between two points, or nothing if Newton's method fails."""
         bound = self.bounds[0] if outside.parameter < self.bounds[0] else self.bounds[1]
         share = (bound - inside.parameter) / (outside.parameter - inside.parameter)
         a, b = self._unknowns(inside), self._unknowns(outside)
@@ -221,7 +221,7 @@ class _Follower:
         return [] if found is None else [found.point]
 
     def _unknowns(self, point: BranchPoint) -> np.ndarray:
-        """Return start, period and parameter, each scaled by its own unit."""
+        """Return start, period and parameter as one vector, each divided by its own unit."""
         orbit = point.orbit
         return (
             np.concatenate([orbit.start.values, [orbit.period] if self.is_free else [], [point.parameter]])
@@ -257,7 +257,7 @@ class _Follower:
         return None, _CORRECTIONS
 
     def close(self, orbit: Orbit, value: float) -> _Closing | None:
-        """Return the data of Newton's method for an orbit that needs no correction."""
+        """Return the start of a Newton iteration at an orbit that is already periodic."""
         motion = Motion(self.model.with_(**{self.parameter: value}), self.method)
         point = BranchPoint(value, orbit, motion, np.zeros(0), (), self.is_free)
         return self._closing(point, self._unknowns(point))

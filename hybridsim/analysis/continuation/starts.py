@@ -28,7 +28,7 @@ def begun_elsewhere(point: BranchPoint) -> tuple[BranchPoint, Solution]:
 
 
 def in_shared(tangent: np.ndarray, point: BranchPoint) -> np.ndarray:
-    """Return the entries of a tangent for the period and the parameter, which do not depend on the orbit's start."""
+    """Set all entries of a tangent to zero except those of the period and the parameter."""
     found = tangent.copy()
     found[: len(point.orbit.start.values)] = 0.0
     return found

@@ -179,7 +179,7 @@ def _scaled(A: np.ndarray) -> np.ndarray:
 
 
 def _extent(field: Field, x: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
-    """Return the range of each state over the equilibria around x, or None if the guards admit no point."""
+    """Return the range of each state over the equilibria around x, or None if the guards exclude all of them."""
     n = len(x)
     low, high = np.empty(n), np.empty(n)
     for i in range(n):

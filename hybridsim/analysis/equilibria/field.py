@@ -45,7 +45,7 @@ class Field:
         return found.values[0, :n], found.slopes[0, :n], found.values[0, n:], found.slopes[0, n:]
 
     def at_sides(self, x: np.ndarray) -> Field:
-        """Return the field in the modes that x determines: sides of corners and jumps, pieces of tables."""
+        """Return the same equations in the modes that belong to x, such as the side of each corner."""
         if not self.by_state:
             return self
         z = modes_by_state(self.system, self.by_state, 0.0, x, self.p, self.z)
@@ -87,7 +87,7 @@ def is_driven(system: System) -> bool:
 
 
 def modes_of(system: System, mode: Mapping[str, str] | str | None) -> tuple[np.ndarray, tuple[int, ...]]:
-    """Return mode numbers from a dict by component, and the components whose modes the state determines.
+    """Return the given modes as numbers, and the components whose modes follow from the state.
 
     A string is the mode of the only component. The state determines the modes of corners, tables and jumps of
     a rate, which are not declared as components, unless their mode is given.

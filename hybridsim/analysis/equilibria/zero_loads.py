@@ -60,7 +60,7 @@ def _load(
 
 
 def _other_times(system: System, t: float) -> list[float]:
-    """Return times at which the load is compared: over a period, and the times of tables."""
+    """Return the times at which a load is compared with its present value."""
     times = [time for declared in system.model.inputs for time in declared.times]
     period = common_period(system)
     return times if period is None else [*times, *(t + period * k / _SAMPLES for k in range(1, _SAMPLES))]

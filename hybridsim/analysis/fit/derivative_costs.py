@@ -23,11 +23,11 @@ class DerivativeCosts:
         self._run_time = self._exact_time = math.inf
 
     def add_run(self, seconds: float) -> None:
-        """Take the time of a run into account."""
+        """Add the measured time of one run."""
         self._runs, self._run_time = self._runs + 1, min(self._run_time, seconds)
 
     def add_exact(self, seconds: float) -> None:
-        """Take the time of exact derivatives into account."""
+        """Add the measured time of one computation of exact derivatives."""
         self._exact, self._exact_time = self._exact + 1, min(self._exact_time, seconds)
 
     def is_exact_cheaper(self, solution: Solution, unknowns: int, run_again: Callable[[], object]) -> bool:

@@ -1,4 +1,4 @@
-"""This module counts the runs of a fit, limits those from further first guesses, and reports a long fit on stderr."""
+"""This module counts the runs of a fit, limits the runs from further guesses, and reports a long fit on stderr."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _RATIO = 2  # of the runs of the first guess, which further first guesses may al
 
 
 class Effort:
-    """The runs of a fit and the time since its start, without compiling.
+    """Counts the runs of a fit, and measures its time without the time for compiling.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""This module makes the first guesses of a fit, and tries further ones if its result may be a local minimum."""
+"""This module makes the first guesses of a fit, and further guesses in case a fit ends at a local minimum."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def first_guesses(unknowns: Mapping[str, Unknown], starts: int) -> list[np.ndarr
 def from_further_guesses(
     search: Search, effort: Effort, noise: Mapping[str, float], *, is_limited: bool
 ) -> tuple[list[OptimizeResult], tuple[str, ...]]:
-    """Return the results from the best of 60 further first guesses, and a warning if the runs allowed fewer.
+    """Return the results of fits that start from further guesses, and a warning if the limit of runs left some out.
 
     is_limited : whether the number of runs is limited. It is not if the first guess has no result.
     """

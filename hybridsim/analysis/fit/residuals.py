@@ -1,4 +1,4 @@
-"""This module computes differences between measured and simulated quantities, and their derivatives by the unknowns."""
+"""This module computes the residuals of a fit, and their derivatives with respect to the unknowns."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _JUMP = 1e-6  # of a quantity's deviation: smaller differences of the sides of a
 
 @dataclass(frozen=True)
 class _Point:
-    """The runs of all records with one set of coordinates, and the simulated values (m,) of the samples.
+    """The runs of all records for one choice of the coordinates, and the simulated sample values (m,).
 
     A run is None if the model is wrong with these coordinates.
     """
@@ -77,7 +77,7 @@ class Residuals:
         self._scale = np.array([self._size(name, unknown) for name, unknown in unknowns.items()])
 
     def _size(self, name: str, unknown: Unknown) -> float:
-        """Return the size of an unknown's coordinate: its guess or a fraction of its range, or 1 if both are zero."""
+        """Return the scale of an unknown: its guess or a fraction of its range, or 1 if both are zero."""
         if unknown.log:
             return 1.0
         guess = abs(unknown.guess or 0.0)
@@ -126,7 +126,7 @@ class Residuals:
         return self._point(coordinates).values
 
     def _point(self, coordinates: np.ndarray) -> _Point:
-        """Return the runs with the given coordinates, which are simulated only once in a row."""
+        """Simulate all records with the given coordinates, unless these are the coordinates of the last call."""
         key = coordinates.tobytes()
         if key not in self._points:
             of_slopes = self._slopes[0] if self._slopes is not None else b""
@@ -178,7 +178,7 @@ class Residuals:
         return False
 
     def slopes(self, coordinates: np.ndarray, is_coarse: bool = False) -> np.ndarray:
-        """Return the derivatives (m, n) of `predicted` by the coordinates.
+        """Return the derivatives (m, n) of the m simulated values with respect to the n coordinates of the fit.
 
         They are those of the runs. A record whose run has none gets central differences.
 
@@ -245,7 +245,7 @@ class Residuals:
 
     @property
     def derivatives(self) -> str:
-        """Text about the derivatives that were used."""
+        """Text that states whether derivatives were exact, and the reason if they were not."""
         if not self.without:
             return "exact"
         reason = next(iter(self.without.values()))
@@ -256,7 +256,7 @@ class Residuals:
 
 
 def _central(one_sided: list[np.ndarray], is_coarse: bool) -> np.ndarray:
-    """Return the mean of the one-sided derivatives, or the smaller one if the two differ much at fine steps."""
+    """Combine derivatives from both sides: return their mean, or the smaller one if they differ much."""
     one_sided = [each for each in one_sided if np.isfinite(each).all()] or [
         np.full_like(one_sided[0], np.nan)
     ]

@@ -1,4 +1,4 @@
-"""This module computes exact derivatives of the simulated samples of a record by the unknowns."""
+"""This module computes exact derivatives of the simulated samples of a record with respect to the unknowns."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from hybridsim.solution import Solution
 
 
 class NoDerivative(Exception):
-    """Raised if the run of a record has no derivative by an unknown; the text gives the reason."""
+    """Raised if the run of a record has no derivative with respect to an unknown; the text gives the reason."""
 
 
 def slopes_of_run(
     solution: Solution, record: Record, names: Sequence[str], present: Mapping[str, np.ndarray]
 ) -> np.ndarray:
-    """Return the derivatives (m, n) of the samples of a record by n unknowns.
+    """Return the derivatives (m, n) of the samples of a record with respect to the n unknowns.
 
     names : the unknowns. present : masks (k,) of the times at which each quantity was measured.
 

@@ -7,7 +7,7 @@ from hybridsim.model import Contact
 
 
 class Rest:
-    """The trivial steady state x = const, with the measures of a steady state; forces are not modelled.
+    """The steady state in which every state is constant, with the measures of a steady state.
 
     x : the constant value of each state. period : of the forcing, nan without forcing.
     """
@@ -22,7 +22,7 @@ class Rest:
         self.energy = {name: 0.0 for name, value in x.items() if value == 0.0}
 
     def harmonic(self, name: str, k: int) -> complex:
-        """Return the mean for k = 0, and zero for other harmonics."""
+        """Return the k-th harmonic of a constant: the constant itself for k = 0, and zero for all other k."""
         return complex(self.x[name] if k == 0 else 0.0)
 
 

@@ -51,7 +51,7 @@ class LadderStep(ABC):
 
     @abstractmethod
     def apply(self, scene: Scene) -> Model | Any:
-        """Return the simpler model, or a motion in closed form with the measures of a steady state.
+        """Return the simplified model, or a closed-form motion that provides the measures of a steady state.
 
         Raises
         ------

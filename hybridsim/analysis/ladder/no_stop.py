@@ -20,7 +20,7 @@ _DENSE = 2001  # points of the search for the largest velocity, before Newton's 
 
 
 class NoStopMotion:
-    """Den Hartog's motion with the measures of a steady state; its two half periods mirror each other."""
+    """The closed-form motion of Den Hartog, with the measures of a steady state."""
 
     def __init__(self, found: Recognised, contact: str, amplitude: float, angle: float) -> None:
         s = found.system
@@ -77,7 +77,7 @@ class NoStopMotion:
         return complex(4.0 / self.period * (self._w @ (self._swing(name) * wave)))
 
     def _swing(self, name: str) -> np.ndarray:
-        """Return the deviation from the mean during the half period after the upper turning point."""
+        """Return the motion about its mean during the half period after the upper turning point."""
         if name == self._contact:
             return np.full(len(self._s), -self._system.slip_force)
         return self._phase.derivative(0 if name == self._x else 1, self._s) - self.mean[name]

@@ -71,7 +71,7 @@ class _Points:
         return found if np.isfinite(found).all() else None
 
     def residuals(self, inner: np.ndarray) -> np.ndarray:
-        """Return the residual at each point. The residual is large if the points do not determine the values."""
+        """Return the residual at each point; all residuals are large if the points do not determine the fit."""
         values = self.values(inner)
         if values is None:
             return np.full(len(self.x), 1e3 * (np.ptp(self.y) or 1.0))

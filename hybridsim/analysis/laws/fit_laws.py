@@ -143,7 +143,7 @@ def fit_laws(
 def _declared(
     model: Model, contact: str, entry: Any, taken: Sequence[str]
 ) -> tuple[str, Model, dict[str, Unknown]]:
-    """Return the label of a law, the model under it, and its unknowns as parameters of the model.
+    """Return the label of a friction law, the model with this law, and the unknowns of the law.
 
     The label contains the fixed parameters if the name of the law is `taken`.
     """
@@ -208,7 +208,7 @@ def criterion(found: Fit, is_stated: bool) -> float:
 
 
 def _present(columns: Iterable[Mapping[str, np.ndarray]], name: str) -> np.ndarray:
-    """Return the samples of a quantity in all records without the missing ones."""
+    """Return the samples of a quantity from all records, and leave out missing samples."""
     values = np.concatenate([each[name] for each in columns if name in each])
     return values[np.isfinite(values)]
 

@@ -177,7 +177,7 @@ def _zeros(
 
 
 class Turns(NamedTuple):
-    """Local extrema inside the pieces of an orbit, with the time and value of each extremum."""
+    """Local extrema inside the intervals of an orbit, with the time and value of each extremum."""
 
     quantity: np.ndarray
     piece: np.ndarray

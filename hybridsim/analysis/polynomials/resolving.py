@@ -140,7 +140,7 @@ class _Intervals(NamedTuple):
 
 
 class _Finished(NamedTuple):
-    """Finished intervals with values (k, POINTS, Q), and a mask (k, Q) of the varying quantities."""
+    """Intervals that need no further division, with values (k, POINTS, Q) and a mask of the varying quantities."""
 
     intervals: _Intervals
     values: np.ndarray
@@ -203,7 +203,7 @@ def orbit_from(
 def _resolved(
     sample: Sample, intervals: _Intervals, rounding: np.ndarray, required: np.ndarray
 ) -> tuple[list[_Finished], np.ndarray]:
-    """Return intervals that resolve the required quantities (Q,), or a mask of the unresolved quantities."""
+    """Divide intervals until the required quantities (Q,) are resolved; return these, or a mask of the failures."""
     count = len(sample.names)
     most = max(
         min(_MAX_INTERVALS, _MAX_VALUES // (POINTS * count)), int(_MAX_PER_STEP * len(intervals.begins))
@@ -252,7 +252,7 @@ def _sampled(sample: Sample, intervals: _Intervals) -> tuple[np.ndarray, np.ndar
 
 
 def _rounding(sample: Sample, steps: _Intervals) -> np.ndarray:
-    """Return the polynomial error (Q,) that rounding causes, measured on very short intervals.
+    """Return the error (Q,) of fitted polynomials that is due to rounding, measured on very short intervals.
 
     For a difference of large terms, such as an energy balance, the misfit may consist of rounding on every
     interval.

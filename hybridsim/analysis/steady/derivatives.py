@@ -44,7 +44,7 @@ _ALIKE = 1e-9  # relative changes of the periods of the forcing that differ by l
 
 @dataclass(frozen=True)
 class SteadyReading(Readable):
-    """A reading of a periodic motion, such as an amplitude, and its derivatives by parameters.
+    """A measure of a periodic motion, such as an amplitude, with its derivatives with respect to parameters.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ class SteadyReading(Readable):
 
 @dataclass(frozen=True)
 class SteadySensitivities(Readable):
-    """The derivatives of a periodic motion, of its period and of its readings by parameters.
+    """The derivatives of a periodic motion, its period and its measures with respect to parameters.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ class SteadySensitivities(Readable):
 
     @refusing
     def of(self, reading: str, *quantities: str) -> SteadyReading:
-        """Return a reading over one period and its derivatives by the parameters; see `Sensitivities.of`.
+        """Return a measure of one period, with its derivatives with respect to parameters; see `Sensitivities.of`.
 
         Parameters
         ----------
@@ -148,7 +148,7 @@ def steady_sensitivities(
     is_free: bool,
     rests: bool,
 ) -> SteadySensitivities:
-    """Return the derivatives of a periodic motion, or of a rest, by parameters.
+    """Return the derivatives of a periodic motion or an equilibrium with respect to parameters.
 
     solution, orbit : the run over one period. is_free : without forcing. rests : at an equilibrium.
     """
@@ -188,7 +188,7 @@ def steady_sensitivities(
 
 
 def _free(monodromy: np.ndarray, by: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the derivatives of the start (n + d, P) and of the period (P,) without forcing."""
+    """Return the derivatives of start and period of an orbit without forcing, with respect to P parameters."""
     count = len(rates)
     system = np.zeros((count + 1, count + 1))
     system[:count, :count] = np.eye(count) - monodromy
@@ -200,7 +200,7 @@ def _free(monodromy: np.ndarray, by: np.ndarray, rates: np.ndarray) -> tuple[np.
 def _relative_periods(
     system: System, slopes: np.ndarray, parameters: Sequence[str], solution: Solution
 ) -> np.ndarray:
-    """Return the derivatives (P,) of the logarithm of the forcing's period, from the `slopes` of all parameters."""
+    """Return the relative derivatives (P,) of the forcing's period with respect to the parameters."""
     by_name = {p.name: row for p, row in zip(system.model.parameters, slopes, strict=True)}
     rates = VectorSlopes(system, solution._segments[0].origin).rates @ slopes
     found = [-row / rate for row, rate in zip(rates, system.rates.tolist(), strict=True) if rate != 0.0]

@@ -1,4 +1,4 @@
-"""This module follows motions with incommensurate forcing periods until an initial change has decayed."""
+"""This module follows motions with incommensurate forcing periods until a disturbance of the start has decayed."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _NO_PERIOD = "the periods of forcing and clocks have no common multiple"
 
 
 class Followed(NamedTuple):
-    """The result of `follow`: an equilibrium if one was found, and whether an initial change decays."""
+    """The result of `follow`: an equilibrium if one was found, and whether a disturbance of the start decays."""
 
     rests: Orbit | None
     dies_out: bool
@@ -29,7 +29,7 @@ class Followed(NamedTuple):
 
 
 def follow(motion: Motion, longest: float, settle: int, max_periods: int) -> Followed:
-    """Follow a motion over more and more periods of its slowest forcing, until an initial change has decayed.
+    """Follow a motion over more and more periods of its slowest forcing, until a disturbance of the start decays.
 
     If every small change of the start decays, the motion follows the forcing alone, with its frequencies and
     their sums: it is quasi-periodic. Otherwise it has further frequencies, or is chaotic.

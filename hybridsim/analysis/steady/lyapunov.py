@@ -63,7 +63,7 @@ class Growth:
         return logarithms
 
     def _change(self, duration: float) -> np.ndarray:
-        """Follow the motion for a duration, and return what the directions have become."""
+        """Follow the motion for a duration, and return the directions at its end."""
         n, motion, before = len(self.point.x), self.motion, self.directions * self.scale
         solution = motion.run(self.point, duration)
         self.point = replace(point_at_end(solution), at=self.point.at + duration)
@@ -81,14 +81,14 @@ class Growth:
 
 
 def _orthogonal(change: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return orthogonal directions, the factor of each, and whether it can be told from rounding errors."""
+    """Return orthogonal directions, the growth factor of each, and whether the factor exceeds rounding errors."""
     directions, triangle = np.linalg.qr(change)
     factors = np.abs(np.diag(triangle))
     return directions, factors, factors > _RESOLVED * factors.max(initial=0.0)
 
 
 def largest_exponents(motion: Motion, start: Point, period: float) -> tuple[float, float]:
-    """Return the mean growth rates of an initial change, over 150 periods and over the next 150 periods.
+    """Return the mean growth rate of a small change over 150 periods, and over the next 150 periods.
 
     Exponential growth has the same rate in both halves, unlike growth by a power of time. The rates are -inf if
     stick reduces the change to zero.

@@ -237,7 +237,7 @@ class Measures:
         return spent / (self.solution.t_end - self.solution.t_start)
 
     def held_mode(self, contact: str) -> str:
-        """Return the mode that counts as stick: ``stick``, or the sliding mode of a switching surface."""
+        """Return the mode that counts as stick: ``stick``, or the mode in which a switching surface is followed."""
         automata = {a.name: a for a in self.solution._system.automata if a.has_surface}
         automaton = automata[
             known_name(contact, list(automata), "the steady state has no contact", "contacts")

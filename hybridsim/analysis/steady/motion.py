@@ -41,7 +41,7 @@ class Point:
         return np.concatenate([self.x, self.discrete])
 
     def moved(self, change: np.ndarray) -> Point:
-        """Return a copy of the point with states and discrete states changed by (n + d,)."""
+        """Return a copy of the point with a change (n + d,) added to its states and discrete states."""
         n = len(self.x)
         return replace(self, x=self.x + change[:n], discrete=self.discrete + change[n:])
 

@@ -1,4 +1,4 @@
-"""This module finds periodic orbits that lie on the boundary of their mode, which Newton's method may return.
+"""This module finds periodic orbits for which the velocity of a contact, or another guard, is always zero.
 
 An example is slip with the velocity zero at all times. Newton's method follows the equations of one mode, and the
 multipliers are those of this mode. A small change of such an orbit leads to another mode, so they decide nothing.
@@ -14,7 +14,7 @@ _ZERO = 1e-6  # of the change of a guard by the size of the motion
 
 
 def lies_on_a_guard(solution: Solution, scale: np.ndarray) -> bool:
-    """Return whether a guard that is active all the time is zero all the time, relative to the size of the motion.
+    """Return whether some guard is zero over the whole orbit, relative to the size of the motion.
 
     A guard that no state changes does not count: its mode cannot change.
 

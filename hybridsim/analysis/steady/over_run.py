@@ -45,7 +45,7 @@ class OverRun(Measures):
         return float(self._alone(name).extremes[side][0])
 
     def _alone(self, name: str) -> Orbit:
-        """Return the orbit of one quantity."""
+        """Return an orbit that contains only one quantity."""
         if name not in self._found:
             orbit = self._orbit
             q = slice(orbit.column(name), orbit.column(name) + 1)

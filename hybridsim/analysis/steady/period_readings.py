@@ -1,4 +1,4 @@
-"""This module reads amplitudes, energies and times in modes from summaries of closed-form motions over a period."""
+"""This module computes amplitudes, energies and times in modes from summaries of motions over a period."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ Reader = Callable[[Any], np.ndarray]
 
 
 def period_reader(word: str, system: System) -> Reader | None:
-    """Return a function that computes a reading (m,) from `Summarised`, or None if summaries lack the reading."""
+    """Return a function that computes a measure (m,) from summaries of periods, or None if they do not contain it."""
     head, _, name = word.partition(".")
     if head in _OF_STATES and name in system.names:
         return _of_state(head, system.names.index(name))

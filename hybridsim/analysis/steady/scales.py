@@ -40,7 +40,7 @@ def rounding_of(sizes: np.ndarray, rtol: float) -> np.ndarray:
 
 
 def stands_still(system: System, x: np.ndarray, p: np.ndarray, z: np.ndarray, rtol: float) -> bool:
-    """Return whether all rates at x are zero except for errors of the state within the tolerance."""
+    """Return whether all rates at x are zero within the error that the tolerance allows for the states."""
     if not system.has_tape or not system.n:
         return True
     f, A = _rates(system, x, p, z)

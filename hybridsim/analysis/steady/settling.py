@@ -51,7 +51,7 @@ class Passings:
     adds_up: bool = False
 
     def residual(self, multiple: int) -> float:
-        """Return the largest change of a state over the last `multiple` passages, relative to its scale."""
+        """Return the largest relative change of a state over the last `multiple` passages."""
         if self.rests:
             return 0.0
         if len(self.values) <= multiple:
@@ -59,12 +59,12 @@ class Passings:
         return relative(self.values[-1] - self.values[-1 - multiple], self.scale)
 
     def repeats_after(self, tolerance: float) -> int | None:
-        """Return the number of passages after which the motion repeats, or None before the motion has converged."""
+        """Return the number of passages after which the motion repeats, or None if it has not converged yet."""
         found = (m for m in range(1, min(LONGEST_WORD, len(self.values) - 1) + 1))
         return next((m for m in found if self._error(m, CLOSER * tolerance) <= tolerance), None)
 
     def _error(self, multiple: int, rounding: float) -> float:
-        """Return the estimated distance of the last passage from the limit, by extrapolation."""
+        """Return the extrapolated distance between the last passage and the limit of all passages."""
         residual = self.residual(multiple)
         back = (len(self.values) - 1) // (2 * multiple)
         if back == 0:
@@ -88,7 +88,7 @@ class Passings:
         return multiple * left / rate
 
     def _change(self, back: int, multiple: int) -> float:
-        """Return the change of the states over `multiple` passages, by default the last passages."""
+        """Return the relative change of the states over `multiple` passages, counted back from the last passage."""
         return relative(
             self.values[-1 - back * multiple] - self.values[-1 - (back + 1) * multiple], self.scale
         )

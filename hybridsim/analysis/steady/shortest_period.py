@@ -1,4 +1,4 @@
-"""This module reduces the period of a periodic orbit if it was found as several passages of a shorter orbit."""
+"""This module reduces the period of an orbit that was found with a multiple of its shortest period."""
 
 from __future__ import annotations
 

@@ -193,7 +193,7 @@ def steady_state(
 
 
 class _Search:
-    """Follows a motion until its kind is known."""
+    """Follows a motion until it is known to be periodic, at rest or irregular."""
 
     def __init__(
         self,
@@ -235,7 +235,7 @@ class _Search:
             passings = self._follow(passings)
 
     def _not_below_rounding(self, passings: Passings) -> Passings:
-        """Return the passages with scales that are not below rounding errors.
+        """Return the passages with scales that are not smaller than rounding errors.
 
         A state that has decayed relative to its former size has no scale of its own. A discrete state that
         settles on zero gets its size from the other states: from the effect over one period of a change of
@@ -435,7 +435,7 @@ def _found(
 
 
 def _refuse_what_ends(system: System, has_period: bool) -> None:
-    """Reject models with impacts, and models that events or inputs change permanently."""
+    """Reject models with impacts, and models that an event or an input changes permanently."""
     model = system.model
     if system.is_unilateral.any():
         raise UsageError(

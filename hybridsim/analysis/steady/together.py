@@ -60,7 +60,7 @@ def steady_motions(
     effort: Effort,
     may_continue: Callable[[], bool],
 ) -> Iterator[Orbits]:
-    """Yield the steady motions at the points that compiled code can decide; see `steady_orbits`."""
+    """Yield steady motions at the points for which compiled code can find them; see `steady_orbits`."""
     from hybridsim.ensemble.group import Ensemble
     from hybridsim.ensemble.orbits import steady_orbits
 
@@ -68,7 +68,7 @@ def steady_motions(
 
 
 def settled(motion: Motion, effort: Effort) -> SteadyState | None:
-    """Return the steady motion of a model from its own start, or None if compiled code cannot find the motion."""
+    """Return the steady motion from the model's initial state, or None if compiled code cannot find it."""
     system = system_of(motion.model)
     parameters = np.array([list(system.values.values())])
     starts = system.start_state({})[None, :]

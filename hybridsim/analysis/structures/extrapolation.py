@@ -1,4 +1,4 @@
-"""This module extrapolates states before and after some periods to a state that the period does not change."""
+"""This module extrapolates from the states at successive periods to a state that repeats after one period."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ _RCOND = 1e-10  # relative to the largest singular value; smaller ones are round
 
 
 def limit_of(before: np.ndarray, after: np.ndarray, scale: np.ndarray) -> tuple[np.ndarray, float]:
-    """Return the limit (n,) of states before and after periods (k, n), and the change per period expected there.
+    """Return the limit (n,) of states before and after k periods, and the expected change over a period at the limit.
 
     The limit is the combination of the states after the periods, with weights of sum one, for which the same
     combination of the changes is the smallest. It is exact for a linear map with k - 1 multipliers. Every linear

@@ -17,7 +17,7 @@ _NEUTRAL = 2e-4  # growth per repetition that is allowed, as of a direction in w
 
 
 def grows(period_map: PeriodMap, scale: np.ndarray, multiple: int, direction: np.ndarray) -> bool:
-    """Return whether a change (2n,) in a direction grows over repetitions of a motion; if not, restore the map.
+    """Return whether a disturbance (2n,) of a repeating motion grows; if it decays, restore the map.
 
     After some repetitions the change is in the direction that shrinks least or grows fastest. Its growth over a
     repetition then converges to the size of the largest multiplier. The motion is followed with and without the
@@ -47,7 +47,7 @@ def grows(period_map: PeriodMap, scale: np.ndarray, multiple: int, direction: np
 def _followed(
     period_map: PeriodMap, start: tuple[np.ndarray, ...], periods: int
 ) -> tuple[tuple[np.ndarray, ...], np.ndarray]:
-    """Return the map and the states (2n,) some periods after a start."""
+    """Follow the motion over some periods from a stored start; return the new stored state and the states (2n,)."""
     period_map.restore(start)
     for _ in range(periods):
         period_map.advance()

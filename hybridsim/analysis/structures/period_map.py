@@ -73,13 +73,13 @@ class PeriodMap:
 
     @property
     def state_names(self) -> list[str]:
-        """The names of the states in their order here."""
+        """The names of the states, in the order that the map uses."""
         system, order = self.system, self._run.built.dofs.tolist()
         return [names[i] for names in (system.names, system.velocities) for i in order]
 
     @property
     def changes(self) -> bytes:
-        """The changes of mode of each contact over the last period, and the modes at its end, to be compared."""
+        """The mode changes of each contact over the last period and its final modes, as bytes for comparison."""
         events = np.concatenate([*self._run.events, np.zeros((0, 4), dtype=np.int64)])[:, :3]
         return events[np.argsort(events[:, 0], kind="stable")].tobytes() + self.modes.tobytes()
 
@@ -101,7 +101,7 @@ class PeriodMap:
             part[...] = former
 
     def put(self, x: np.ndarray) -> None:
-        """Set the states (2n,) and keep the modes; the next period makes velocities satisfy the constraints."""
+        """Set the states (2n,) without changing the modes; the next period corrects the velocities."""
         self._run.state.x[:] = x.reshape(2, -1)
         self._run.state.stamp[:] = -1.0  # no event has just made anything zero
 
@@ -125,7 +125,7 @@ class PeriodMap:
         return 0.5 * np.ptp(states, axis=0), largest
 
     def recorded(self, periods: int, offset: float) -> SeriesTrajectory:
-        """Return the motion over some periods from a time within the first one; the map ends here."""
+        """Record the motion over some periods, beginning within the first one; the map cannot be used afterwards."""
         if offset > 0.0:
             self._carry_out((0.0, offset))
         self._run.is_recorded = True
@@ -133,7 +133,7 @@ class PeriodMap:
         return SeriesTrajectory(self.system, self._run, None, "all", (0.0, 0.0))
 
     def _set_tolerances(self, largest: np.ndarray) -> None:
-        """Choose the absolute tolerances by the largest sizes (2n,) of the states, or else by natural ones."""
+        """Set the absolute tolerances in proportion to the largest sizes (2n,) of the states."""
         sizes = np.maximum(largest, FLOOR * self.natural)
         sizes[sizes == 0.0] = 1.0
         self._run.state.tolerance[:] = (_ABSOLUTE * self._run.rtol * sizes).reshape(2, -1)

@@ -1,4 +1,4 @@
-"""This module defines the steady state of a mechanical system, with readings by coordinate and contact."""
+"""This module defines the steady state of a mechanical system, with measures of each coordinate and contact."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ class StructureSteadyState(SteadyState):
 
     @cached_property
     def _orbit(self) -> Orbit:
-        """The orbit of the contacts; each coordinate has an orbit of its own."""
+        """The motion of the contacts over the period, as an orbit."""
         self._require_period()
         return orbit_of_contacts(self._run)
 
@@ -156,7 +156,7 @@ class StructureSteadyState(SteadyState):
 
     @property
     def multipliers(self) -> NoReturn:
-        """Refused, because a run of a `MechanicalSystem` carries no derivatives."""
+        """Raise an error, because a run of a `MechanicalSystem` provides no derivatives."""
         self._refuse_derivatives("multipliers")
 
     def sensitivities(self, parameters: Sequence[str] | None = None) -> NoReturn:

@@ -42,7 +42,7 @@ def masses_of(system: MechanicalSystem, built: Built) -> np.ndarray:
 
 
 def with_floor(scale: np.ndarray, masses: np.ndarray, fraction: float = FLOOR) -> np.ndarray:
-    """Return scales (2n,) that are not below a fraction of the largest one of positions, or of velocities.
+    """Raise small scales (2n,) to a fraction of the largest scale of all positions, or of all velocities.
 
     Coordinates with different units are compared by the square root of their mass times their scale.
     """

@@ -40,7 +40,7 @@ _RESTS = 1e-12  # a smaller range relative to the largest size of its kind is re
 
 
 class Settled(NamedTuple):
-    """The result of following a motion.
+    """The result of a search for a repeating motion.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ class Settled(NamedTuple):
 
 
 class _Trial(NamedTuple):
-    """What was before an extrapolation, and whether it is short; fresh: pairs since the extrapolation before it."""
+    """The data before an extrapolation, which are restored if the extrapolation fails."""
 
     former: tuple[np.ndarray, ...]
     states: list[np.ndarray]
@@ -75,7 +75,7 @@ class _Trial(NamedTuple):
 
 
 class Settling:
-    """Follows a motion until it repeats; see the module."""
+    """Follows a forced motion until it repeats."""
 
     def __init__(self, period_map: PeriodMap, tol: float, settle: int, max_periods: int) -> None:
         self.map, self.tol, self.settle, self.max_periods = period_map, tol, settle, max_periods
@@ -115,7 +115,7 @@ class Settling:
                 self._extrapolate(passings.scale)
 
     def _multiple(self, passings: Passings) -> int | None:
-        """Return after how many periods the motion repeats, or None; a motion that nearly repeats earlier waits."""
+        """Return the number of periods after which the motion repeats, or None if this number is not yet certain."""
         found = passings.repeats_after(self.tol)
         if found is None and self._is_exhausted and passings.residual(1) <= self.tol:
             return 1
@@ -135,7 +135,7 @@ class Settling:
         return found
 
     def _passings(self) -> tuple[Passings, bool]:
-        """Return the passages of phase zero so far, and whether the motion has come to rest."""
+        """Return the states at the starts of all periods so far, and whether the motion has come to rest."""
         half, largest = self._follow(self.map.sizes)
         largest = np.maximum(largest, self.map.natural)
         scale = with_floor(np.maximum(half, FLOOR * largest), self.map.masses)
@@ -145,7 +145,7 @@ class Settling:
         return Passings(times, np.array(self._states), scale, last), bool(rests.all())
 
     def _extrapolate(self, scale: np.ndarray) -> None:
-        """Put the limit of the periods with equal events in place of the states."""
+        """Replace the states by their extrapolated limit, computed from periods with equal events."""
         pairs = self._pairs[-self._fresh :] if self._is_squared else self._pairs
         if not self._may_extrapolate or len(pairs) < _FEWEST or self._waited < self._wait:
             return
@@ -168,7 +168,7 @@ class Settling:
         self._states, self._fresh = [limit], 0
 
     def _end_trial(self, scale: np.ndarray) -> bool:
-        """Return False and take back the last extrapolation if the periods after it do not change the states less."""
+        """Take back the last extrapolation unless the next period changes the states less; return whether it stays."""
         trial, self._trial = self._trial, None
         if trial is None:
             return True
@@ -189,7 +189,7 @@ class Settling:
         return False
 
     def _attracts(self, passings: Passings, multiple: int) -> bool:
-        """Return whether a change in the slowest direction does not grow; if it does, go on from the changed states."""
+        """Return whether a disturbance in the slowest direction decays; if it grows, keep the disturbed motion."""
         if not (self.extrapolations and self._may_extrapolate):
             return True
         if not grows(self.map, passings.scale, multiple, self._slowest):

@@ -36,7 +36,7 @@ def steady_state_of_structure(
     integrator: str,
     **refused: Any,
 ) -> StructureSteadyState:
-    """Find the steady motion of a system; `hybridsim.steady_state` describes the arguments and checks most.
+    """Find the steady motion of a mechanical system, as `hybridsim.steady_state` does for a model.
 
     Raises
     ------
@@ -81,7 +81,7 @@ def _result(period_map: PeriodMap, settled: Settled) -> StructureSteadyState:
 
 
 def _drifting(passings: Passings) -> int | None:
-    """Return the index of a state that has left its range by equal changes, or None; slow settling is no drift."""
+    """Return the index of a state that drifts beyond its range by equal amounts per period, or None."""
     i = passings.drifting()
     if i is None:
         return None

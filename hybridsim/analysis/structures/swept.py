@@ -18,7 +18,7 @@ from hybridsim.solution.run_trajectory import relative_velocity
 
 
 class Named(NamedTuple):
-    """A parameter or a state: its name, its value and its unit, which is not known."""
+    """The name and the value of a parameter or a state; the unit is not known."""
 
     name: str
     value: Expression

@@ -84,7 +84,7 @@ class SuiteComparison(Readable):
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """The names of the lines, in order."""
+        """The labels of the compared integrators and laws, in the order of the comparison."""
         return tuple(dict.fromkeys(label for result in self.results for label in result.comparison.labels))
 
     def verdicts(self) -> dict[str, dict[str, Verdict]]:

@@ -79,7 +79,7 @@ class Points:
 
     @cached_property
     def _parsed(self) -> list[list[Expression]]:
-        """The values of a grid as expressions, each of which is parsed once for many points."""
+        """The values of the grid as parsed expressions."""
         return [[parse(setting) for setting in axis.settings] for axis in self.axes]
 
 
@@ -176,7 +176,7 @@ def _setting(name: str, value: Any) -> float | Expression:
 
 
 def _values(model: Model, name: str, row: Sequence[float | Expression], swept: frozenset[str]) -> np.ndarray:
-    """Return the values as numbers, or as text if a value depends on another axis."""
+    """Return the values of an axis as numbers, or as text if a value depends on another axis."""
     declared = {p.name: p.value for p in model.parameters}
     dependencies = {}
     for setting in row:

@@ -44,7 +44,7 @@ class _UpAndDown:
         return 2 * len(self._rising), 1
 
     def settings(self, numbers: range) -> list[Settings]:
-        """Return the settings of points; the second half of the numbers belongs to the falling branch."""
+        """Return the settings of points: rising values for the first half of them, falling ones for the second half."""
         return [self._rising[min(k, 2 * len(self._rising) - 1 - k)] for k in numbers]
 
 

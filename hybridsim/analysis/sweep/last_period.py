@@ -76,7 +76,7 @@ class LastPeriod:
         alone: Callable[[Settings], Outcome],
         watch: Watch,
     ) -> Together | None:
-        """Run all points in compiled code, or return None; the function `alone` runs the points that fail."""
+        """Run all points in compiled code and repeat failed points with `alone`; return None if this is impossible."""
         from hybridsim.ensemble.group import Ensemble, can_run_together
         from hybridsim.ensemble.runs import last_periods
 
@@ -115,7 +115,7 @@ def period_of(model: Model) -> float:
 
 
 def _reader(word: str, system: System) -> Reader | None:
-    """Return a function that computes one value from sums over the last periods, or None."""
+    """Return a function that computes a named value from the last periods, or None for an unsupported name."""
     if word == "period":
         return lambda last: last.periods
     if word == "residual":

@@ -206,7 +206,7 @@ def _known(model: Model, of_motion: Sequence[str]) -> list[str]:
 
 
 def _steady_reader(word: str, system: System) -> Reader | None:
-    """Return a function that computes one value of `hybridsim.ensemble.orbits.Orbits`, or None."""
+    """Return a function that computes a named value from periodic orbits, or None for an unsupported name."""
     of_motion: dict[str, Reader] = {
         "period": lambda found: np.where(found.rests, math.nan, found.periods),
         "multiple": lambda found: np.where(found.rests, 0.0, found.multiples),

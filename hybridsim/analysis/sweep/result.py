@@ -239,7 +239,7 @@ def statuses(sweep: Sweep) -> list[str]:
 
 
 def _where(sweep: Sweep, k: int, shape: tuple[int, ...]) -> str:
-    """Return the parameters of the point at which the k-th value of a result was computed."""
+    """Return, as text, the settings of the point that belongs to the k-th value of a result."""
     place = np.unravel_index(k, shape)
     if sweep.mode == "list":
         return ", ".join(_set(name, settings[place[0]]) for name, settings in sweep.axes.items())

@@ -46,7 +46,7 @@ class OfRun:
         return dict.fromkeys(self.reading_names, math.nan)
 
     def run(self, model: Model, previous: OverRun | None) -> OverRun:
-        """Return the run; with `warm_start`, the run begins at the end of the previous run."""
+        """Run the model once; with `warm_start`, the run begins at the end of the previous run."""
         arguments = dict(self.options)
         only_ends = _are_final(self.reading_names)
         if only_ends:
@@ -76,7 +76,7 @@ class OfRun:
 
 
 def of_run(reading_names: Sequence[str], model: Model, options: Mapping[str, Any]) -> OfRun:
-    """Return the measure of some readings of runs; "final" alone stands for all states.
+    """Return a measure that reads values such as ``final.x`` from runs; "final" stands for the end of all states.
 
     Raises
     ------
@@ -114,7 +114,7 @@ def of_run(reading_names: Sequence[str], model: Model, options: Mapping[str, Any
 
 
 def passage_of(word: str) -> Passage | None:
-    """Return the parts of a reading of a first passage, or None for another reading.
+    """Split a name such as ``first_passage.x>0.1`` into its parts; return None for any other name.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""This module samples a settled motion at a Poincare section: once per forcing period, or at a level."""
+"""This module samples a steady motion once per forcing period, or each time a quantity passes a level."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class Section:
     options: Mapping[str, Any]
 
     def run(self, model: Model, previous: Passings | None) -> Passings:
-        """Return the samples at one point; with `warm_start`, the run begins at the end of the previous run."""
+        """Return the section samples of one model; with `warm_start`, the run begins at the end of the previous run."""
         motion = Motion(model, dict(self.options), dict(self.first))
         start = None if previous is None else previous.end
         return self._passed(motion, start) if self.level else self._strobed(motion, start)

@@ -1,4 +1,4 @@
-"""This package computes derivatives of a run by its initial state and parameters, through all events."""
+"""This package computes derivatives of a run through all events, with respect to initial state and parameters."""
 
 from hybridsim.analysis.variations.sensitivities import Sensitivities, sensitivities
 

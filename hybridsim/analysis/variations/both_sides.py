@@ -13,7 +13,7 @@ _ROUNDING = 1e-11  # of the states' sizes, for a change of everything by its own
 
 
 class OneSide:
-    """Derivatives of a run. On a guard or surface, the derivatives are one-sided, on the side that the run takes."""
+    """Derivatives of a run. On a guard or surface, they are one-sided derivatives, on the side that the run takes."""
 
     def __init__(self, carrier: Carrier, directions: Directions) -> None:
         self._carrier, self._directions = carrier, directions
@@ -39,12 +39,12 @@ class OneSide:
         return _shift(self._carried, number)
 
     def own_sizes(self) -> np.ndarray:
-        """Return the length of a change (M,) in each direction that changes some quantity by its own size."""
+        """Return, for each direction, the length of a change that alters some quantity by its own size."""
         found: np.ndarray = self._carrier.own_sizes(self._directions)
         return found
 
     def differing(self) -> list[tuple[str, np.ndarray]]:
-        """Return names of functions at zero, each with the mask (M,) of the directions in which the sides differ."""
+        """Return an empty list, because a one-sided derivative is unique."""
         return []
 
 

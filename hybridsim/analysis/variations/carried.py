@@ -120,7 +120,7 @@ class Carrier:
         return Carried(Y, Yd, times, self._off, self._lost, starts, shifts)
 
     def between(self, carried: Carried, directions: Directions, number: int, stops: np.ndarray) -> np.ndarray:
-        """Return the derivatives (k, n + d, M) at ascending local times (k,) of one segment."""
+        """Return the derivatives (k, n + d, M) of states and discrete states at k local times of one segment."""
         Y, Yd = carried.starts[number]
         self._flow.prepare(Yd, directions.parameters)
         x = self._flow.over(number, Y, Yd, directions.parameters, stops)
@@ -131,7 +131,7 @@ class Carrier:
         return bool(segment.start.minus(self._end) >= -self._rounding)
 
     def _moves(self, shift: np.ndarray) -> np.ndarray:
-        """Return a mask (M,) of the directions in which a time with the derivatives `shift` moves."""
+        """Return a mask (M,) of the directions in which a time with the derivatives `shift` changes."""
         length = self.solution.t_end - self.solution.t_start
         return np.asarray(np.abs(shift) * self._changes.own > _ROUNDING * length)
 
@@ -156,7 +156,7 @@ class Carrier:
         return np.where(is_later, last.Y, Y), np.where(is_later, last.Yd, Yd)
 
     def _note(self, off: list[OffZero]) -> np.ndarray | float:
-        """Store functions that are exactly zero; return their contribution to the derivatives."""
+        """Store the functions that are exactly zero, and return their contribution to the derivatives."""
         self._off += off
         if not self._sided:
             return 0.0
@@ -170,7 +170,7 @@ class Carrier:
         return np.concatenate([self._scale, np.where(discrete > 0.0, discrete, 1.0)])[:, None]
 
     def own_sizes(self, directions: Directions) -> np.ndarray:
-        """Return the length of a change (M,) in each direction that changes some quantity by its own size."""
+        """Return, for each direction, the length of a change that alters some quantity by its own size."""
         system = self.system
         constants = np.abs(np.concatenate([system.discrete_start, self._vector.constants()]))
         scale = np.concatenate([self._scale, np.where(constants > 0.0, constants, 1.0)])
@@ -288,7 +288,7 @@ class Carrier:
         return rates_of(self.system, float(segment.s[0]), segment.x[0], segment.p, segment.z)
 
     def _settled(self, rounds: Rounds, following: Segment, x: np.ndarray, before: np.ndarray) -> np.ndarray:
-        """Return the derivatives of the states just after an instant, and store functions at zero.
+        """Return the derivatives of the states just after an event, and store the functions that are zero there.
 
         x, before : states and rates (n,) before the instant.
         """
@@ -301,7 +301,7 @@ class Carrier:
 
 
 def _place(rounds: Rounds, following: Segment) -> Place:
-    """Return the `Place` just after an instant."""
+    """Return the point of the run just after an instant."""
     return Place(
         float(following.s[0]), float(following.origin), following.x[0], following.p, following.z,
         rounds.Y, rounds.Yd, rounds.shift, rounds.large,

@@ -22,7 +22,7 @@ _TANGENTIAL = (
 
 @dataclass(frozen=True)
 class Place:
-    """A point of the run, at which derivatives are computed: time, states, run-time vector and modes.
+    """A point of a run at which derivatives are computed: time, states, parameters and modes.
 
     Y, Yd : derivatives of the states (n, M) and discrete states (d, M); shift : of the time (M,).
     large : sizes (n, M) of the terms of the sums Y.
@@ -41,7 +41,7 @@ class Place:
 
 @dataclass(frozen=True)
 class Changed:
-    """The value of a guard, monitor or surface, its derivatives (M,), and the sizes (M,) of the summed terms.
+    """A guard, monitor or surface: its value, its derivatives (M,), and the sizes (M,) of their terms.
 
     row (n,), by_time : its derivatives by the states and by time.
     """
@@ -56,11 +56,11 @@ class Changed:
 
     @property
     def moves(self) -> np.ndarray:
-        """A mask (M,) of the directions in which the function changes."""
+        """A mask (M,) of the directions in which this function changes."""
         return np.asarray(np.abs(self.by) > _ALIKE * self.sizes)
 
     def along(self, rates: np.ndarray) -> float:
-        """Return the rate of the function for given rates of the states, or 0 if the terms cancel."""
+        """Return the rate of the function for given rates of the states, or 0 if its terms cancel each other."""
         terms = np.append(self.row * rates, self.by_time)
         return float(terms.sum()) if abs(terms.sum()) > _TANGENTIAL * np.abs(terms).sum() else 0.0
 
@@ -83,7 +83,7 @@ class Changes:
         self._scale, self.own = scale, own
 
     def flow(self, at: Place) -> tuple[np.ndarray, np.ndarray]:
-        """Return the rates (n,) of the states, and their derivatives by all arguments of the rates."""
+        """Return the rates (n,) of the states, and their derivatives with respect to all arguments of the rates."""
         found = tangent_tape(self.system, at.z)(
             np.array([at.s]), at.x[None, :], at.p, self.vector.seeds(at.p)
         )

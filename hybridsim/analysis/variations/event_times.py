@@ -42,7 +42,7 @@ class EventTimes:
         Y: np.ndarray,
         Yd: np.ndarray,
     ) -> np.ndarray:
-        """Return the derivatives (M,) of the time at which all located events at local time `s` happen."""
+        """Return the derivatives (M,) of the time of the events that were located at local time `s`."""
         width = self._changes.G.shape[1]
         at = segment.origin.plus(s)
         knots = self._changes.vector.knots(at)

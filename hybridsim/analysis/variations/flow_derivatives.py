@@ -1,4 +1,4 @@
-"""This module continues derivatives along the segments of a run, between events."""
+"""This module integrates the derivatives of the states along the segments of a run."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class FlowDerivatives:
         self._stiff: set[int] = set()
 
     def prepare(self, Yd: np.ndarray, G: np.ndarray) -> None:
-        """Compute the derivatives over all segments, for changes of all discrete states and of some parameters.
+        """Compute derivatives over all segments with respect to states, discrete states and changed parameters.
 
         Yd (d, M), G (P, M): derivatives of the discrete states and parameters.
         """
@@ -69,7 +69,7 @@ class FlowDerivatives:
         self._intervals = transitions(self._slopes, steps, self._scale, self._constants)
 
     def _slopes(self, number: np.ndarray, s: np.ndarray) -> np.ndarray:
-        """Return the derivatives (m, n, n + q) of the rates in segments with ascending numbers (m,)."""
+        """Return the derivatives (m, n, n + q) of the rates at m points, each in the segment that `number` gives."""
         x = self._of_run.states(number, s)
         first = np.flatnonzero(np.diff(number, prepend=-1))
         parts = []
@@ -85,7 +85,7 @@ class FlowDerivatives:
         return np.concatenate(parts) if parts else np.zeros((0, n, n + len(self._moving)))
 
     def _beside(self, number: int, tape: TangentTape, s: float) -> np.ndarray:
-        """Return the derivatives (n, n + q) of the rates next to a local time at which the derivatives do not exist."""
+        """Return derivatives (n, n + q) of the rates close to a local time at which the derivatives do not exist."""
         segment = self._segments[number]
         begin, end = float(segment.s[0]), float(segment.s[-1])
         near = np.array([s + _ISOLATED * (end - begin) * (1.0 if 2.0 * s < begin + end else -1.0)])
@@ -102,7 +102,7 @@ class FlowDerivatives:
     def over(
         self, number: int, Y: np.ndarray, Yd: np.ndarray, G: np.ndarray, stops: np.ndarray
     ) -> np.ndarray:
-        """Return the derivatives (k, n, M) at ascending local times (k,) of a segment from derivatives at its start.
+        """Return the derivatives (k, n, M) of the states at k local times of a segment.
 
         Y (n, M), Yd (d, M): derivatives of the states and discrete states. G (P, M): derivatives of the parameters.
         """
@@ -145,7 +145,7 @@ class FlowDerivatives:
         return found
 
     def _stiffly(self, number: int, stops: np.ndarray) -> np.ndarray:
-        """Return the derivatives of `_regularly` in a segment in which changes decay within a step."""
+        """Return derivatives over a segment in which small changes decay within a step."""
         segment = self._segments[number]
         begin = float(segment.s[0])
         later = np.unique(np.concatenate([segment.s[segment.s < stops[-1]], stops]))
@@ -159,7 +159,7 @@ class FlowDerivatives:
     def projected(
         self, segment: Segment, Y: np.ndarray, Yd: np.ndarray, G: np.ndarray, s: float | None = None
     ) -> np.ndarray:
-        """Return the derivatives with held states on their constraints, at a local time or at the start."""
+        """Return the derivatives after correction by the constraints of the held states."""
         system = self.system
         if not system.holds(segment.z):
             return Y

@@ -51,7 +51,7 @@ class Impacts:
         p: list[Any],
         z: np.ndarray,
     ) -> list[Dual]:
-        """Return the states just after the impact of the contacts of one cluster."""
+        """Return the states just after a simultaneous impact of coupled contacts."""
         system, n, m, width = self.system, self.system.n, self._m, len(s.slope)
         out: list[Any] = [0.0] * (2 * m * (n + m))
         self._impulses(s, x, p, z, out)
@@ -164,7 +164,7 @@ def _kinds(problem: ImpactProblem, answer: Answer) -> np.ndarray:
 def _refuse_undecided(
     problem: ImpactProblem, answer: Answer, kinds: np.ndarray, d_impulses: np.ndarray, names: str, t: float
 ) -> None:
-    """Refuse an impact exactly at the border of two outcomes, if a small change decides between them."""
+    """Raise an error for an impact between two outcomes if a small change decides which one occurs."""
     k, P = problem.normal, answer.impulses
     size = _SAME * np.abs(P).max(initial=0.0)
     border = np.zeros(len(P), dtype=bool)

@@ -54,7 +54,7 @@ def differ(one: np.ndarray, other: np.ndarray) -> bool:
 
 
 def off_zero(changes: Changes, at: Place) -> tuple[np.ndarray, list[OffZero]]:
-    """Return the derivatives with held states on their surfaces, and a list of the functions at zero."""
+    """Return the derivatives, corrected by constraints, and a list of the functions at zero."""
     sides = _Sides(changes, at)
     off = sides.surfaces()
     return sides.at.Y, off + sides.guards()
@@ -87,7 +87,7 @@ def monitors_reached(changes: Changes, at: Place, later: Place) -> list[OffZero]
 
 
 class _Sides:
-    """Computes the effects of small changes to both sides of the functions at zero."""
+    """Computes the effects of small changes on functions that are exactly zero, on both sides of zero."""
 
     def __init__(self, changes: Changes, at: Place) -> None:
         self.changes, self.system, self.at, self.before = changes, changes.system, at, at
@@ -185,7 +185,7 @@ class _Sides:
         return off
 
     def _passed(self, c: int, both: list[Changed], above: np.ndarray, below: np.ndarray) -> list[OffZero]:
-        """Return data of a surface that the run leaves, before and after the impulses of held components.
+        """Describe how a surface that the run crosses affects the derivatives.
 
         On the other side, directions with impulses do not return by themselves.
         """
@@ -241,7 +241,7 @@ class _Sides:
         return [self.off(name, one, other, there, 0.0)]
 
     def limits(self, c: int) -> list[OffZero]:
-        """Return the force limits that a holding component, or a component about to hold, reaches exactly."""
+        """List the force limits that a component reaches exactly, either in its holding mode or just before it."""
         automaton, off = self.system.automata[c], []
         z = self._with(c, automaton.hold)
         numbers = automaton.guards[automaton.hold]
@@ -261,7 +261,7 @@ class _Sides:
         return off
 
     def off(self, name: str, one: Changed, other: np.ndarray, there: np.ndarray, speed: float) -> OffZero:
-        """Describe a function at zero by its rate on the other side of zero."""
+        """Describe how a function that is exactly zero affects the derivatives if a small change makes it nonzero."""
         other = other & one.moves
         t = self.at.origin + self.at.s
         if speed == 0.0:
@@ -293,7 +293,7 @@ def _are_opposite(one: np.ndarray, other: np.ndarray) -> bool:
 
 
 def beyond(off: Sequence[OffZero], width: int) -> tuple[np.ndarray, np.ndarray | float]:
-    """Return the mask (M,) of directions without derivatives, and a contribution to the derivatives.
+    """Return the mask (M,) of directions without derivatives, and the sum of the contributions of all functions.
 
     A direction to the other side of several functions at once is lost, because the order of return matters.
     """

@@ -89,7 +89,7 @@ class OverTime:
     def moving(
         self, name: str, number: int, s: float, is_after: bool, shift: np.ndarray | None
     ) -> np.ndarray:
-        """Return the derivatives (M,) of a quantity at a local time of a segment, which moves by `shift` (M,)."""
+        """Return the derivatives (M,) of a quantity at a point of a segment whose time changes by `shift` (M,)."""
         system, segment = self.solution._system, self.solution._segments[number]
         stops = np.array([s])
         Y = self._sides.within(number, stops, is_after)
@@ -105,7 +105,7 @@ class OverTime:
         return self._sides.shift(number)
 
     def own_sizes(self) -> np.ndarray:
-        """Return the length of a change (M,) in each direction that changes some quantity by its own size."""
+        """Return, for each direction, the length of a change that alters some quantity by its own size."""
         return self._sides.own_sizes()
 
     def at_end(self) -> np.ndarray:
@@ -117,5 +117,5 @@ class OverTime:
         return self._sides.of_times()
 
     def differing(self) -> list[tuple[str, np.ndarray]]:
-        """Return names of functions at zero, each with the mask (M,) of the directions in which the sides differ."""
+        """List the functions at zero with different derivatives on both sides, each with a mask (M,) of directions."""
         return self._sides.differing()

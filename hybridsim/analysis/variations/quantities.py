@@ -69,7 +69,7 @@ class QuantityDerivatives:
     def _slopes(
         self, name: str, segment: Segment, s: np.ndarray, Y: np.ndarray, shift: np.ndarray | None
     ) -> np.ndarray:
-        """Return the derivatives (k, q, M) of all q results of a generated function."""
+        """Return the derivatives (k, q, M) of all quantities or surfaces at k local times."""
         system = self.system
         function = differentiated_rows(getattr(system.code.module, name))
         count = len(system.quantities) if name == "quantities" else len(system.surface_of)

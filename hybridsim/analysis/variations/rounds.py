@@ -147,7 +147,7 @@ class Rounds:
         return has_fired
 
     def _delay(self, p: np.ndarray, s: float, origin: float, fired: Sequence[Occurrence]) -> None:
-        """Shift the state to the time at which the guards fire if the start is changed a little.
+        """Compute derivatives for guards that are zero at the start and fire later if the start changes a little.
 
         They must fire together, and no other event may happen before that.
         """
@@ -168,7 +168,7 @@ class Rounds:
         self.shift = self.shift + later
 
     def _reading(self) -> np.ndarray:
-        """Return the modes in which the states are evaluated, without constraints that begin later."""
+        """Return the modes without constraints that begin only later at this instant."""
         z = self.z.copy()
         for c, mode in self._loose:
             z[c] = mode
@@ -224,7 +224,7 @@ class Rounds:
         return c if automaton.is_unilateral and automaton.modes.index(one.source) == automaton.above else -1
 
     def _lifted(self, p: np.ndarray) -> tuple[list[Dual], list[Any]]:
-        """Return the states and the run-time vector as dual numbers."""
+        """Return the states and the run-time values as dual numbers, that is, with their derivatives."""
         return with_slopes(self.x, self.Y), self._vector.lifted(p, self.d, self.Yd, self._G)
 
     def _key(self, one: Occurrence, p: np.ndarray, s: float) -> tuple[Any, ...]:

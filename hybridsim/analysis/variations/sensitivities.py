@@ -1,4 +1,4 @@
-"""This module computes derivatives of a run's end and event times by its initial state and parameters."""
+"""This module computes derivatives of a run's end and event times with respect to its start and parameters."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from hybridsim.solution import Solution
 
 @dataclass(frozen=True)
 class Sensitivities(Readable):
-    """The derivatives of a run and its event times by its initial state and parameters.
+    """The derivatives of a run and its event times with respect to its initial state and parameters.
 
     Parameters
     ----------

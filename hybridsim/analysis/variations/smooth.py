@@ -179,7 +179,7 @@ def _speeds(
 def stiff_transitions(
     slopes: Slopes, knots: np.ndarray, scale: np.ndarray, constants: np.ndarray, stops: np.ndarray
 ) -> np.ndarray:
-    """Return the derivatives of a stiff segment by Radau's formula, which allows longer pieces.
+    """Return the derivatives over a stiff segment by Radau's formula, which allows longer steps.
 
     The formula damps unresolved changes, so that only those that have not decayed need to be resolved.
     """
@@ -243,7 +243,7 @@ def over_intervals(
 def _rates(
     method: Collocation, slopes: Slopes, begins: np.ndarray, lengths: np.ndarray, Y: np.ndarray | None = None
 ) -> np.ndarray:
-    """Return the derivatives of the rates (K, stages, n, n + q) at the nodes of each piece."""
+    """Return the derivatives (K, stages, n, n + q) of the rates with respect to the start, at the collocation nodes."""
     D = slopes((begins[:, None] + lengths[:, None] * method.nodes).ravel())
     stages, count, n, width = len(method.nodes), len(begins), D.shape[1], D.shape[2]
     D = D.reshape(count, stages, n, width)

@@ -14,7 +14,7 @@ Numbers = tuple[int, ...]
 def tangent_tape(
     system: System, z: np.ndarray, guards: Numbers = (), monitors: Numbers = (), surfaces: Numbers = ()
 ) -> TangentTape:
-    """Return the instruction tape of the rates in the modes z, and of some guards, monitors and surfaces."""
+    """Return the compiled operations for the rates in the modes z, and for some guards, monitors and surfaces."""
     return _stored(system, z.tobytes(), guards, monitors, surfaces)
 
 

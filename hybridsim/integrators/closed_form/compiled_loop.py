@@ -1,4 +1,4 @@
-"""This module provides the tables, arrays and record of the method `exact` to the compiled loop."""
+"""This module connects the method `exact` to the compiled event loop: its tables, arrays and results."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from hybridsim.integrators.closed_form.segments import ClosedFormArrays, ClosedF
 
 
 class ClosedFormKernels(MethodKernels):
-    """The part of the method `exact` in the compiled loop of a run."""
+    """Connects the method `exact` to the compiled loop of a run."""
 
     loop = staticmethod(closed_form_loop)
     rows = ClosedFormRows
@@ -46,7 +46,7 @@ class ClosedFormKernels(MethodKernels):
         self.lin: LinearTables
 
     def part_of(self, known: KnownTimes) -> KnownTimes:
-        """Return the known times up to the first much longer or shorter piece of an input.
+        """Return the known times up to the first interval of an input that is much longer or shorter.
 
         Tables for long segments would be inaccurate in a short piece. Its coefficients are large, and in a long
         segment they would have large effects. A state has an error relative to these.
@@ -57,7 +57,7 @@ class ClosedFormKernels(MethodKernels):
     def tables(
         self, tapes: Tapes, state: HybridState, origin: Instant, target: Instant
     ) -> tuple[Any, deque[Any]] | None:
-        """Return the tables of the modes so far, and reusable arrays for tables of this shape."""
+        """Return the tables of linear motion for all modes that have occurred, with arrays for further tables."""
         if self._piece < math.inf:
             self._reach = horizon = self._piece
         else:
@@ -71,7 +71,7 @@ class ClosedFormKernels(MethodKernels):
         return self.lin, spare
 
     def arrays(self) -> Any:
-        """Return new packed arrays of the segment kernel for one call."""
+        """Return new arrays for one call of the compiled loop of the method `exact`."""
         tables, widest = self.lin, self.lin.values.shape[1]
         return packed(
             ClosedFormArrays(
@@ -100,11 +100,11 @@ class ClosedFormKernels(MethodKernels):
         return own
 
     def end(self, own: Any, tapes: Tapes, lin: Any) -> Any:
-        """Return the tables of the call, their segment length, and the last zeros of guards."""
+        """Return the data for the next call: the tables, their segment length, and the last zeros of guards."""
         return lin, self._reach, own.hints.copy()
 
     def take(self, result: Any) -> None:
-        """Store the segment length of the tables and the last zeros of guards for the next call."""
+        """Keep the segment length of the tables and the last zeros of guards for the next call."""
         _, self.horizon, self.hints = result
 
     def block(
@@ -114,12 +114,12 @@ class ClosedFormKernels(MethodKernels):
         last_steps: np.ndarray,
         *record: np.ndarray,
     ) -> ClosedFormBlock:
-        """Return the segments of a call as one block."""
+        """Return the segments that one call of the compiled loop has stored."""
         return ClosedFormBlock(self.recorded, result[0], rows.rows, rows.ends, rows.coordinates, *record)
 
     @property
     def place(self) -> tuple[np.ndarray, ...]:
-        """Return the segment length of the tables and the last zeros of guards, for a checkpoint.
+        """Return the data that a checkpoint needs: the segment length of the tables, and the last zeros of guards.
 
         The hints are stored with their mode vectors, because another process has these in other rows.
         """

@@ -20,7 +20,7 @@ from hybridsim.integrators.taylor.method import TaylorStepper
 
 
 def _kernels(system: System, tolerances: Tolerances, longest: float) -> ClosedFormKernels:
-    """Return the part of the method in the compiled loop; tolerances are not used."""
+    """Return the compiled functions of the method `exact`; tolerances are not used."""
     return ClosedFormKernels(system, longest)
 
 
@@ -75,6 +75,6 @@ class Exact(Integrator):
         first_step: float | None,
         watch: Watch,
     ) -> Stepper:
-        """Begin a smooth segment in the mode loop, by Taylor series with a tight tolerance."""
+        """Begin to integrate the motion up to the next event, by Taylor series with a tight tolerance."""
         tight = Tolerances(TIGHTEST, 1e-3 * tolerances.atol, tolerances.max_step)
         return TaylorStepper(flow, x0, s_bound, tight, first_step)

@@ -66,7 +66,7 @@ class ClosedFormArrays(NamedTuple):
 
 
 class ClosedFormRows(NamedTuple):
-    """The rows of the stored segments."""
+    """One row of data for each stored segment."""
 
     ends: np.ndarray  # end in local time
     rows: np.ndarray  # row of the tables
@@ -75,7 +75,7 @@ class ClosedFormRows(NamedTuple):
 
 @inline_always
 def first_exit_of(lin: Any, tapes: Any, k: int, bound: float, state: Any, own: Any) -> tuple[int, float]:
-    """Find the guard that becomes negative first in the modes of row `k`, and its time.
+    """Find the first guard that becomes negative in the modes of table row `k`, and the time at which it does.
 
     Waves have their zeros in closed form. Of the other guards the one with the earliest zero in the last
     visit of these modes comes first, or else the one that falls fastest. The rest need to be followed no
@@ -127,7 +127,7 @@ def first_exit_of(lin: Any, tapes: Any, k: int, bound: float, state: Any, own: A
 
 @inlined
 def stopped(hints: Any, k: int, former: Any) -> SegmentEnd:
-    """Restore the initial guesses of zeros for a segment that is not stored."""
+    """Restore the stored zeros of guards, because this segment is not accepted."""
     put(former, hints[k])
     return not_followed(STOPPED)
 
@@ -136,7 +136,7 @@ def stopped(hints: Any, k: int, former: Any) -> SegmentEnd:
 def closed_form_segment(
     start: Any, model: Any, loop: Any, state: Any, work: Any, own: Any, rows: Any
 ) -> SegmentEnd:
-    """Follow one segment in closed form, as the kernel of the event loop for the method `exact`.
+    """Compute one segment in closed form, as part of the compiled event loop of the method `exact`.
 
     The result is FULL also after POINTS evaluations of guards; the rest of the run then begins in another call.
     """

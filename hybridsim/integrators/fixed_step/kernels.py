@@ -23,7 +23,7 @@ def leaves_side(before: float, after: float) -> bool:
 def brought_to_zero(
     address: Any, s: float, x: Any, p: Any, z: Any, fresh: Any, is_first: bool, before: Any, after: Any
 ) -> bool:
-    """Return whether a monitor is zero because of the modes at the start of a step, not because of the motion.
+    """Return whether a monitor became zero through the modes at the start of a step, not through the motion.
 
     address: the monitors' function, whose values are written to before; after: their values at the end of the
     last step. Monitors for which this holds are marked in fresh.

@@ -31,7 +31,7 @@ class March(ABC):
         fresh: np.ndarray,
         rows: tuple[np.ndarray, np.ndarray, np.ndarray],
     ) -> tuple[int, int]:
-        """Take steps from local time 0 up to the bound, or until Python has to act.
+        """Take steps from local time 0 up to the bound, or until an event needs the Python code.
 
         guard_numbers: guards of components without a surface. fresh: monitors that have just fired. Row k of rows =
         (times, states, modes) holds the start of step k and the modes during it; the last row is the end.

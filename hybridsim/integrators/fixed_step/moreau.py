@@ -146,7 +146,7 @@ class MoreauMarch(March):
         fresh: np.ndarray,
         rows: tuple[np.ndarray, np.ndarray, np.ndarray],
     ) -> tuple[int, int]:
-        """Take steps up to the bound, or until Python has to act."""
+        """Take steps up to the bound, or until an event needs the Python code."""
         x, z = start
         count, why = moreau_steps(
             self._functions, self._settings, self.step, self._table, guard_numbers, bound, p, x.copy(), z.copy(), fresh,

@@ -55,7 +55,7 @@ def _store_loads(scratch: Any, n: int, m: int, k: int, bound: int) -> None:
 
 @kernel
 def approach(restitutions: Any, table: Any, s: float, h: float, x: Any, p: Any, z: Any, scratch: Any) -> bool:
-    """Find the gaps that may exert a force in a step, and rebound speeds; return False for an invalid restitution.
+    """Find the gaps that may exert a force in a step, and their rebound speeds; report an invalid restitution.
 
     A gap takes part if it is closed, or would be closed by the middle of the step at its present rate. A
     closed gap has no approach speed, because rounding must not make it rebound.

@@ -43,7 +43,7 @@ _CONVERGED, _UNSETTLED, _AMISS = range(3)  # how a step ended
 
 
 class Scratch(NamedTuple):
-    """Scratch arrays for n states, m surfaces, C components, Q quantities, G guards."""
+    """Scratch arrays for n states, m surfaces, C components, Q monitored quantities and G guards."""
 
     sides: np.ndarray
     trial: np.ndarray

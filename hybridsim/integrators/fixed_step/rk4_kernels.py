@@ -118,7 +118,7 @@ def run_steps(
     work: Any,
     counters: Any,
 ) -> tuple[int, int]:
-    """Take fixed steps from local time 0 towards the bound, until Python has to act.
+    """Take fixed steps from local time 0 towards the bound, until an event needs the Python code.
 
     addresses: choose, step, march (see `step_code`), guards, monitors, project, surfaces. settings: step, halvings,
     eps. flags: bisection, zeroed, located release, rest of step, whether march can be used. counters: rhs, guards,

@@ -72,7 +72,7 @@ class Rk4March(March):
         fresh: np.ndarray,
         rows: tuple[np.ndarray, np.ndarray, np.ndarray],
     ) -> tuple[int, int]:
-        """Take steps up to the bound, or until Python has to act."""
+        """Take steps up to the bound, or until an event needs the Python code."""
         x, z = start
         rows[1][0] = x
         count, why = _run_steps(

@@ -60,7 +60,7 @@ def _checkpoint(
 
 
 def surface_table(system: System) -> np.ndarray:
-    """Return a row for each component with a surface: its number, its modes, and guards of the holding mode.
+    """Return the numbers of the component, modes and guards for each component with a surface.
 
     The entries of a gap that do not exist are -1.
     """
@@ -418,7 +418,7 @@ class FixedStepRun:
             record.occurrences.add(events)
 
     def _side_of_zeros(self, z: np.ndarray) -> None:
-        """Give rows with zero velocity the mode of the next row, because sgn has no third mode."""
+        """Replace stick in the stored modes by the slip direction that follows, because sgn(v) has no stick mode."""
         for c, _, _, hold, *_ in surface_table(self.system):
             for k in np.flatnonzero(z[:-1, c] == hold)[::-1]:
                 z[k, c] = z[k + 1, c]

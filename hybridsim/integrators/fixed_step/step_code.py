@@ -109,7 +109,7 @@ class StepCode:
                 yield "    release(t, x, p, z, changed)"
 
     def _slope(self, prefix: str) -> Iterator[str]:
-        """Yield code of the rates; at zero velocity, the rates are the mean of both sides."""
+        """Yield code that computes the rates; at zero velocity, a rate is the mean of its values on both sides."""
         yield f"if {self._held()}:"
         yield f"    sides = integers({max(self.components, 1)})"
         yield f"    other = doubles({self.n})"
@@ -156,7 +156,7 @@ class StepCode:
         yield from (f"out[{width + k}] = values[{k}]" for k in range(self.surfaces))
 
     def _here(self) -> Iterator[str]:
-        """Yield code that copies the states and the forcing at the time of the states."""
+        """Yield code that copies the states, and computes the forcing at the time of these states."""
         yield f"here = doubles({self.width})"
         yield from (f"here[{i}] = x[{i}]" for i in range(self.n))
         if self.forcing:
@@ -260,7 +260,7 @@ def _machine_text(module: Any, code: StepCode) -> str:
 
 
 class _Pin(ast.NodeTransformer):
-    """Replaces an element of the run-time vector by its value."""
+    """Replaces one run-time value by a number in generated code."""
 
     def __init__(self, pin_at: int, value: float) -> None:
         self.text, self.value = f"p[{pin_at}]", value

@@ -53,5 +53,5 @@ class Rodas5P(Integrator):
         first_step: float | None,
         watch: Watch,
     ) -> Stepper:
-        """Begin a smooth segment."""
+        """Begin to integrate the motion up to the next event."""
         return RosenbrockStepper(TABLEAU, flow, x0, s_bound, tolerances, first_step)

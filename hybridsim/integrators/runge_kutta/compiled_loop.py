@@ -1,4 +1,4 @@
-"""This module provides the arrays, record and cost of Runge-Kutta methods to the compiled loop."""
+"""This module connects Runge-Kutta methods to the compiled event loop: their arrays, results and cost."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ class RungeKuttaArrays(NamedTuple):
 
 
 class RungeKuttaKernels(MethodKernels):
-    """The part of an explicit Runge-Kutta method in the compiled loop of a run."""
+    """Connects an explicit Runge-Kutta method to the compiled loop of a run."""
 
     loop = staticmethod(runge_kutta_loop)
     rows = StepRows
@@ -116,7 +116,7 @@ class RungeKuttaKernels(MethodKernels):
         self.first_step = tolerances.first_step or 0.0
 
     def arrays(self) -> Any:
-        """Return new packed arrays of the segment kernel for one call."""
+        """Return new arrays for one call of the compiled Runge-Kutta loop."""
         system, n, columns, tapes = (
             self.system,
             self.system.n,
@@ -165,7 +165,7 @@ class RungeKuttaKernels(MethodKernels):
         return (float, (2,)), (float, (self.system.n, 2 * TERMS))
 
     def begin(self, own: Any, tapes: Tapes) -> Any:
-        """Write the settings of the run and the code of the instruction tapes to the arrays."""
+        """Write the settings and the compiled operations of the run to the arrays."""
         own.first_step[0], own.counts[:] = self.first_step, 0
         return replaced(own, settings=self.settings, parts=self.parts.of(tapes), codes=self.codes.of(tapes))
 
@@ -186,5 +186,5 @@ class RungeKuttaKernels(MethodKernels):
         self.first_step = result[2]
 
     def block(self, result: Any, rows: StepRows, last_steps: np.ndarray, *record: np.ndarray) -> HermiteBlock:
-        """Return the segments of a call as one block."""
+        """Return the segments that one call of the compiled loop has stored."""
         return HermiteBlock(self.recorded, last_steps, *rows, *record)

@@ -119,5 +119,5 @@ class RungeKuttaIntegrator(Integrator):
         first_step: float | None,
         watch: Watch,
     ) -> Stepper:
-        """Begin a smooth segment."""
+        """Begin to integrate the motion up to the next event."""
         return RungeKuttaStepper(self.tableau, flow, x0, s_bound, tolerances, first_step)

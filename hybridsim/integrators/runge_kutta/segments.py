@@ -1,4 +1,4 @@
-"""This module follows a segment by explicit Runge-Kutta steps up to the first event.
+"""This module integrates the motion up to the next event by explicit Runge-Kutta steps.
 
 The dense output of a step is the two-point Hermite polynomial on the Taylor coefficients of the flow at its ends; a
 step in which a guard becomes negative is repeated up to the event.
@@ -243,7 +243,7 @@ def is_zero(model: Any, fired: int, s: float, scale: Any, state: Any, work: Any)
 def runge_kutta_segment(
     start: Any, model: Any, loop: Any, state: Any, work: Any, own: Any, rows: Any
 ) -> SegmentEnd:
-    """Follow one segment by Runge-Kutta steps, as the kernel of the event loop.
+    """Integrate one segment by Runge-Kutta steps, as part of the compiled event loop.
 
     own: `hybridsim.integrators.runge_kutta.compiled_loop.RungeKuttaArrays`.
     """

@@ -42,14 +42,14 @@ class Tableau:
 
     @cached_property
     def packed(self) -> Any:
-        """Return the arrays for `attempt`."""
+        """Return the coefficients as packed arrays for compiled code."""
         rows = [self.b, self.e, self.e_low] if self.e_low.size else [self.b, self.e]
         arrays = (np.ascontiguousarray(part, dtype=float) for part in (self.c, self.a, rows))
         return packed(Coefficients(*arrays))
 
     @cached_property
     def leading_terms(self) -> tuple[int, float, float, int, float]:
-        """Return the first terms of the error estimates for a linear problem.
+        """Return the order and coefficient of each leading error term for a linear problem.
 
         On a linear problem a combination e of the stages is sum_k (e . A**(k - 1) 1) k! h**k x_k. Return the
         order q of the main estimate, its coefficients at q and q + 1, then order and coefficient of the low

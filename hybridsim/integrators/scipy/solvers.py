@@ -60,7 +60,7 @@ class ScipyIntegrator(Integrator):
         first_step: float | None,
         watch: Watch,
     ) -> Stepper:
-        """Begin a smooth segment."""
+        """Begin to integrate the motion up to the next event."""
         import scipy.integrate
 
         solver = getattr(scipy.integrate, self.solver)

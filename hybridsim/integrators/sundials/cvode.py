@@ -163,7 +163,7 @@ class _Cvode(Integrator):
         first_step: float | None,
         watch: Watch,
     ) -> Stepper:
-        """Begin a smooth segment."""
+        """Begin to integrate the motion up to the next event."""
         return with_first_steps(
             flow,
             x0,

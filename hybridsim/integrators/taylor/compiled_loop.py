@@ -1,4 +1,4 @@
-"""This module provides the arrays, record and cost of Taylor's method to the compiled loop."""
+"""This module connects Taylor's method to the compiled event loop: its arrays, results and cost."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class TaylorArrays(NamedTuple):
 
 
 class TaylorKernels(MethodKernels):
-    """The part of Taylor's method in the compiled loop of a run."""
+    """Connects Taylor's method to the compiled loop of a run."""
 
     loop = staticmethod(taylor_loop)
     rows = StepRows
@@ -68,7 +68,7 @@ class TaylorKernels(MethodKernels):
         self.codes = series_codes(system, self.order)
 
     def arrays(self) -> Any:
-        """Return new packed arrays of the segment kernel for one call."""
+        """Return new arrays for one call of the compiled Taylor loop."""
         system, order, n = self.system, self.order, self.system.n
         registers, guards, fading = system.registers.count, system.guard_count, most_fading(system)
         return packed(
@@ -95,7 +95,7 @@ class TaylorKernels(MethodKernels):
         return (float, (2,)), (float, (self.system.n, self.order + 1))
 
     def begin(self, own: Any, tapes: Tapes) -> Any:
-        """Write the settings of the run and the code of the instruction tapes to the arrays."""
+        """Write the settings and the compiled operations of the run to the arrays."""
         own.settings.control[:], own.settings.atol[:] = self.settings
         return replaced(own, codes=self.codes.of(tapes))
 
@@ -108,5 +108,5 @@ class TaylorKernels(MethodKernels):
         counters.rhs_evaluations += 2 * steps  # one series and one check per step
 
     def block(self, result: Any, rows: StepRows, last_steps: np.ndarray, *record: np.ndarray) -> SeriesBlock:
-        """Return the segments of a call as one block."""
+        """Return the segments that one call of the compiled loop has stored."""
         return SeriesBlock(self.recorded, last_steps, *rows, *record)

@@ -49,7 +49,7 @@ def series_at(
     code: int, is_known: bool, rows: Any, high: Any, flow_registers: Any, order: int, s: float, x: Any,
     guard_registers: Any, fading: Any, V: Any, U: Any, out: Any,
 ) -> None:  # fmt: skip
-    """Write the Taylor coefficients of states, guards and vanishing functions at (s, x).
+    """Compute the Taylor coefficients of states, guards and vanishing functions at the local time s and the state x.
 
     code: address of a compiled function that does the same; 0 for none. is_known: `values_at` was called last at this
     state.
@@ -84,7 +84,7 @@ def _interpreted_series(
 def taylor_segment(
     start: Any, model: Any, loop: Any, state: Any, work: Any, own: Any, rows: Any
 ) -> SegmentEnd:
-    """Follow one segment by Taylor steps, as the kernel of the event loop.
+    """Integrate one segment by Taylor steps, as part of the compiled event loop.
 
     own: `hybridsim.integrators.taylor.compiled_loop.TaylorArrays`.
     """

@@ -114,7 +114,7 @@ def _number(value: float | None) -> float:
 
 
 def row(setting: str, run: Measured) -> Row:
-    """Return a row of a cell; a run with a wrong end or a wrong event sequence has no numeric errors."""
+    """Return the result of one run as a row; a wrong end or a wrong event sequence makes its numeric errors NaN."""
     if run.ending or run.sequence:
         return Row(setting, math.nan, math.nan, run.steps, run.seconds)
     return Row(setting, run.time_error, run.state_error, run.steps, run.seconds)

@@ -42,7 +42,7 @@ class CooldownRK45(ScipyRK45):
         first_step: float | None,
         watch: Watch,
     ) -> Stepper:
-        """Begin a smooth segment."""
+        """Begin to integrate the motion up to the next event."""
         return _Blind(self.cooldown, flow, x0, s_bound, tolerances, first_step, watch)
 
 

@@ -83,7 +83,7 @@ def example(result: Atlas, scene: Scene) -> Example | None:
 
 
 def typical_failure(cells: list[Cell]) -> Cell | None:
-    """Return the failure to show for a scene: a wrong run is preferred to a run without an end."""
+    """Return the failure to show for a scene; a wrong result is preferred to a run that was aborted."""
     for verdicts in (WRONG, (HANG,)):
         found = [cell for cell in cells if cell.verdict in verdicts]
         found.sort(
@@ -95,7 +95,7 @@ def typical_failure(cells: list[Cell]) -> Cell | None:
 
 
 def first_wrong(cell: Cell) -> str:
-    """Return the setting to which the verdict refers."""
+    """Return the setting that decided the verdict on a cell."""
     text = cell.reason.partition(": ")[0]
     return text if text else cell.rows[0].setting
 
@@ -164,7 +164,7 @@ def _window(first: float, last: float, centre: float, width: float) -> tuple[flo
 
 
 def _events(run: Any, window: tuple[float, float]) -> np.ndarray:
-    """Return the times of the events in a window, without near misses."""
+    """Return the times of the events in a time window; near-grazings do not count."""
     return np.array([e.t for e in run.events if e.kind != "near-grazing" and window[0] <= e.t <= window[1]])
 
 

@@ -43,7 +43,7 @@ class Atlas:
     interrupted: bool = False
 
     def row(self, scene: Scene) -> list[Cell]:
-        """Return the cells of a scene, in the order of the methods."""
+        """Return the results in one scene, in the order of the methods."""
         return [self.cells[scene.name, one.name] for one in self.configurations]
 
     def column(self, configuration: Configuration) -> list[Cell]:

@@ -11,7 +11,7 @@ from hybridsim.testing.scene import Scene, Truth, named, needs
 
 
 def scenes() -> tuple[Scene, ...]:
-    """Return all scenes of this file."""
+    """Return all scenes of accumulating events."""
     return *_ball(), _twisting(), *_tanks()
 
 

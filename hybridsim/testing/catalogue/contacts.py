@@ -93,7 +93,7 @@ def turning_belt() -> Scene:
 
 
 def sequence(expected: list[str]) -> Any:
-    """Return a check of the mode sequence that ignores its times; the states test the times."""
+    """Return a function that checks the order of the mode changes, but not their times."""
 
     def check(solution: Any) -> list[str]:
         found = [f"{e.component}:{e.target}" for e in solution.events if e.component]

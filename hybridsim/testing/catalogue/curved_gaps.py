@@ -8,7 +8,7 @@ from hybridsim.testing.scene import END, Scene, Truth, needs
 
 
 def scenes() -> tuple[Scene, ...]:
-    """Return all scenes of this file."""
+    """Return all scenes of impacts with curved gaps."""
     return _drum(), _discs()
 
 

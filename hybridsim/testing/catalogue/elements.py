@@ -11,12 +11,12 @@ from hybridsim.testing.scene import END, Check, Scene, Truth, needs
 
 
 def scenes() -> tuple[Scene, ...]:
-    """Return all scenes of this file."""
+    """Return all scenes of elements that are declared in one line, and of guards with a direction."""
     return _directions(), _elements(), _delays()
 
 
 def _transitions(component: str, expected: Sequence[tuple[float, str]], within: float = 1e-3) -> Check:
-    """Return a check that a component changes its mode near the expected times, and at no other times."""
+    """Return a function that checks that a component changes its mode near the expected times and never else."""
 
     def check(solution: Any) -> list[str]:
         found = [(event.t, event.target) for event in solution.events if event.component == component]

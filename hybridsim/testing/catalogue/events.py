@@ -11,7 +11,7 @@ from hybridsim.testing.scene import END, Scene, Truth, named, needs
 
 
 def scenes() -> tuple[Scene, ...]:
-    """Return all scenes of this file."""
+    """Return all scenes of event location."""
     return *corridor(), *modes(), *monitored(), *grazing()
 
 
@@ -44,7 +44,7 @@ def grazing() -> tuple[Scene, ...]:
 
 
 def corridor() -> tuple[Scene, ...]:
-    """Return the scene BALL2D with monitors and with guards."""
+    """Return the scene BALL2D, a ball in a corridor, twice: with monitors and with guards."""
     expected = CASES["BALL2D"]["expected"]
     floor, walls = expected["floor"], expected["walls"]
     states = ((2.0, (50 - 4.9 * 4, -19.6, 4.0, 2.0)), (15.0, (*expected["y_end"], expected["x_end"], 1.62)))

@@ -15,7 +15,7 @@ REST = FALL * (1 + E) / (1 - E)
 
 
 def scenes() -> tuple[Scene, ...]:
-    """Return all scenes of this file."""
+    """Return all scenes of impacts with restitution."""
     return _bounce(), _bar(), _table()
 
 
@@ -35,7 +35,7 @@ def closed(name: str, solution: Any) -> list[float]:
 
 
 def closes(*names: str) -> Any:
-    """Return a check that each contact closes exactly once."""
+    """Return a function that checks that each contact closes exactly once."""
 
     def check(solution: Any) -> list[str]:
         found = {name: closed(name, solution) for name in names}
@@ -49,7 +49,7 @@ def closes(*names: str) -> Any:
 
 
 def rests(*names: str) -> Any:
-    """Return a check that the contacts close at the limit of the bounces, within 1e-6."""
+    """Return a function that checks that the contacts close at the limit of the bounces, within 1e-6."""
 
     def check(solution: Any) -> list[str]:
         found = {name: closed(name, solution) for name in names}

@@ -11,7 +11,7 @@ from hybridsim.testing.scene import END, Scene, Truth, named, needs
 
 
 def scenes() -> tuple[Scene, ...]:
-    """Return all scenes of this file."""
+    """Return all scenes of loads."""
     return (
         _floor(),
         _touching(),

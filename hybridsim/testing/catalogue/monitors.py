@@ -1,4 +1,4 @@
-"""Scenes of monitors at stops and bounces, of all actions, and of simultaneous guards of one mode."""
+"""Scenes with monitors at stops and bounces, with all monitor actions, and with simultaneous guards."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from hybridsim.testing.scene import END, Scene, Truth, needs
 
 
 def scenes() -> tuple[Scene, ...]:
-    """Return all scenes of this file."""
+    """Return all scenes of monitors."""
     return _stops(), _bounces(), _table(), _corner(), _rope()
 
 

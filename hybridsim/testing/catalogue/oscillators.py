@@ -17,7 +17,7 @@ STUCK = (("exact-stick", exact_stick("f", {"v": 0.0}, rest=("x",))),)
 
 
 def closed_form(p: Mapping[str, float]) -> ForcedCoulombOscillator:
-    """Return the closed-form motion of a case."""
+    """Return the closed-form motion of an oscillator with the parameters `p`."""
     return ForcedCoulombOscillator(p["m"], p["c"], p["k"], p["Fk"], p["Fs"], p["F0"], p["w"])
 
 
@@ -168,7 +168,7 @@ def threshold() -> Scene:
 
 
 def scenes() -> tuple[Scene, ...]:
-    """Return all scenes of this file."""
+    """Return all scenes of the dry friction oscillator."""
     return (
         *(oscillator(f"FLAG-flag_{which}") for which in ("a", "b_mus", "d_nodamp")),
         *(den_hartog(f"DH-{which}") for which in ("r2-f0.2", "r0.75-f0.3", "r1.5-f0.5")),

@@ -16,7 +16,7 @@ GRAZING_START = (GRAZING_FORCE * (1 - _OMEGA**2) / _D, _DAMPING * _OMEGA**2 * GR
 
 
 def scenes() -> tuple[Scene, ...]:
-    """Return all scenes of this file."""
+    """Return all scenes that amplify small errors."""
     return lifting(), grazing_stop()
 
 

@@ -18,7 +18,7 @@ SLIDING = "sliding"
 
 
 def scenes() -> tuple[Scene, ...]:
-    """Return all scenes of this file."""
+    """Return all scenes of switching surfaces."""
     return (
         *_published(),
         _circle(),
@@ -32,7 +32,7 @@ def scenes() -> tuple[Scene, ...]:
 
 
 def stays(component: str, *terms: str, to_one: bool = False) -> Check:
-    """Return a check that a sum of outputs is 1 or 0 during sliding, except for rounding."""
+    """Return a function that checks that a sum of outputs is 1 or 0 during sliding, except for rounding."""
 
     def check(solution: Any) -> list[str]:
         for interval in solution.modes[component]:
@@ -135,7 +135,7 @@ def spirals_in(solution: Any) -> list[str]:
 
 
 def _along_the_circle() -> Scene:
-    """Return the scene of a motion that slides along a circle and still slides at the end, t = 3.5."""
+    """Return the scene of a motion that slides along a circle until the end of the run, t = 3.5."""
     scene = _circle()
     events = (scene.truth.events or ())[:1]
     truth = replace(scene.truth, events=events, states=scene.truth.states[:2])

@@ -8,7 +8,7 @@ from hybridsim.testing.scene import Scene, Truth, named, needs
 
 
 def scenes() -> tuple[Scene, ...]:
-    """Return all scenes of this file."""
+    """Return all scenes in which long steps are unstable."""
     return _walls(), _follower(), _long_swing()
 
 

@@ -117,7 +117,7 @@ def _flat() -> Scene:
 
 
 def _zeros() -> Scene:
-    """Return the scene of states that start at zeros of their guards and change at rate one."""
+    """Return the scene whose states start at zeros of their guards and change at rate one."""
     starts = tuple(a + b for a, b in _SUMS)
     return named(
         "starts-at-zeros",

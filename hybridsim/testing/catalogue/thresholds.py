@@ -15,7 +15,7 @@ STICK = needs("contacts", "exact-stick")
 
 
 def scenes() -> tuple[Scene, ...]:
-    """Return all scenes of this file."""
+    """Return all scenes near the stick limit."""
     return _micro_slip(), _fading(), _many_stops(), _between(), _half(), _small(), _at_rest()
 
 

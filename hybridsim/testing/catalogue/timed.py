@@ -11,7 +11,7 @@ from hybridsim.testing.scene import Scene, Truth, needs
 
 
 def scenes() -> tuple[Scene, ...]:
-    """Return all scenes of this file."""
+    """Return all scenes of events at known times and of runs backward in time."""
     return *scheduled(), *backward()
 
 

@@ -77,7 +77,7 @@ class Outcome(NamedTuple):
 
 
 class Together(NamedTuple):
-    """The outcomes of points that were measured together, and how many of them had to be measured one by one."""
+    """The outcomes of points that were measured together, and the number of points that had to be measured alone."""
 
     outcomes: list[Outcome]
     alone: int
@@ -162,7 +162,7 @@ def _message(error: Exception) -> str:
 
 
 def _first_copy(job: Job) -> Job:
-    """Return the first received copy of a job, so that all batches in a process share a compiled model."""
+    """Return the first copy of a job that this process received, so that all batches share one compiled model."""
     known = _jobs.get(job.token)
     if known is not None:
         return known

@@ -28,7 +28,7 @@ class Points(Protocol):
         """Shape of the arrays of results; with `warm_start`, runs follow each other along the first axis."""
 
     def settings(self, numbers: range) -> list[Settings]:
-        """Return the values of all axes at some points."""
+        """Return the values of all axes at the points with the given numbers."""
 
 
 def worker_count(executor: Any, workers: int | None) -> int:

@@ -1,4 +1,4 @@
-"""This module collects the outcomes of a batch of points, of which compiled code measures as many as possible."""
+"""This module measures a batch of points in compiled code, and measures one by one the points that fail there."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class PointsTogether:
         readings: Sequence[dict[str, Reading]],
         blank: Sequence[tuple[str, ...]] = (),
     ) -> None:
-        """Store the readings of some points of `parameters`; the readings named in `blank` may be NaN."""
+        """Store measured values of some points; NaN is an error, except for values that `blank` names."""
         for k, (number, found) in enumerate(zip(self._sound[numbers].tolist(), readings, strict=True)):
             missing = [name for name in not_numbers(found) if not (blank and name in blank[k])]
             status = f"not a number: {', '.join(missing)}" if missing else DONE
@@ -47,7 +47,7 @@ class PointsTogether:
         self._watch.tell(len(readings))
 
     def finished(self) -> Together:
-        """Measure the other points one by one, and return all outcomes.
+        """Measure one by one the points that have no outcome yet, and return all outcomes.
 
         If the watch requests a stop, the outcomes are those of the first points, as far as they were run.
         """

@@ -1,1 +1,1 @@
-"""This package differentiates readings of a run: first the points of its extreme values, then the readings."""
+"""This package computes derivatives of results of a run, such as extreme values and means."""

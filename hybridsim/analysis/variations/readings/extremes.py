@@ -22,7 +22,7 @@ _BETWEEN = np.linspace(0.0, 1.0, 9)  # points of a piece at which it is compared
 
 
 class Place(NamedTuple):
-    """A point of a run: segment number, local time, kind, value and number of the piece."""
+    """A candidate for an extreme value: segment, local time, kind of point, value and interval."""
 
     number: int
     s: float
@@ -98,13 +98,13 @@ class Extremes:
         return groups
 
     def _least_between(self, k: int, one: Place, other: Place, sign: int) -> float:
-        """Return the least value (sign 1) of piece k between two points, or minus the greatest value."""
+        """Return the least value between two points on interval k (sign 1), or minus the greatest value (sign -1)."""
         low = self._local(k, one.s) if k == one.piece else -1.0
         high = self._local(k, other.s) if k == other.piece else 1.0
         return float((sign * legendre.legval(low + (high - low) * _BETWEEN, self._series[k])).min())
 
     def _representative(self, group: list[Place], sign: int) -> Place:
-        """Return the best place of a group. A local extremum has no exact time, unlike constant parts and ends."""
+        """Return the best place of a group; constant parts and ends of segments are preferred to local extrema."""
         best = max(sign * place.value for place in group)
         near = [place for place in group if sign * place.value >= best - _SAME * self.size]
         return max(near, key=lambda place: (place.where == HELD, place.where != INSIDE, sign * place.value))
@@ -119,18 +119,18 @@ class Extremes:
             )
 
     def _at(self, k: int, local: float) -> float:
-        """Return the local time in the segment of a point of piece k, from -1 to 1."""
+        """Convert a coordinate between -1 and 1 on interval k to the local time in its segment."""
         return float(self._begins[k] + 0.5 * self._orbit.lengths[k] * (1.0 + local))
 
     def _local(self, k: int, s: float) -> float:
-        """Return the point of piece k, from -1 to 1, at a local time in the segment."""
+        """Convert a local time to a coordinate between -1 and 1 on interval k."""
         return float(np.clip(2.0 * (s - self._begins[k]) / self._orbit.lengths[k] - 1.0, -1.0, 1.0))
 
     def _is_between(self, number: int, s: float) -> bool:
         return self._first < (number, s) < self._last
 
     def _turns(self, sign: int) -> list[Place]:
-        """Return the extrema inside pieces, and the extrema at the common end of two pieces of a segment."""
+        """List the local extrema of a quantity, inside the intervals and at their common ends."""
         turns, orbit, found = self._orbit.turns, self._orbit, []
         for k, t, value, is_minimum in zip(
             turns.piece.tolist(), turns.t.tolist(), turns.value.tolist(), turns.is_minimum, strict=True
@@ -151,7 +151,7 @@ class Extremes:
         return found
 
     def _ends(self, sign: int) -> list[Place]:
-        """Return the ends of each segment, or of the part, towards which the quantity rises (sign 1) or falls."""
+        """Return those ends of each segment at which a quantity may be greatest (sign 1) or least (sign -1)."""
         orbit, found = self._orbit, []
         numbers = orbit.segments[self._inside]
         for number in np.unique(numbers).tolist():
@@ -180,7 +180,7 @@ class Extremes:
         ]
 
     def _rough(self) -> np.ndarray:
-        """Return the values (k, POINTS) on the pieces that no polynomial represents."""
+        """Return the sampled values (k, POINTS) on intervals on which no polynomial is accurate."""
         values = self._orbit.values[self._inside, :, 0]
         is_rough = ~self._orbit.is_smooth[self._inside, 0] & (np.ptp(values, axis=1) != 0.0)
         return np.asarray(values[is_rough])

@@ -1,4 +1,4 @@
-"""This module differentiates readings of a run: extreme values, amplitudes, integrals and means.
+"""This module computes derivatives of results of a run: extreme values, amplitudes, integrals and means.
 
 With the derivatives dq of a quantity q at fixed times:
 
@@ -36,7 +36,7 @@ _JUMPS = 1e-9  # of its size: a quantity that changes by less at an event does n
 
 @dataclass(frozen=True)
 class ReadingDerivatives(Readable):
-    """A reading of a run, such as a maximum, and its derivatives by the initial state and by parameters.
+    """A result of a run, such as a maximum, with its derivatives with respect to initial state and parameters.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ class ReadingDerivatives(Readable):
 
 
 def quantities_of(reading: Any, quantities: Sequence[Any]) -> tuple[str, ...]:
-    """Return the names of the quantities of a reading after checking their number and types."""
+    """Check the number and types of the quantities for a reading such as "maximum", and return their names."""
     if text(reading, "reading") not in READINGS:
         raise UsageError(
             f"there is no reading {reading!r}", remedy=nearest(reading, READINGS, kind="readings")
@@ -77,7 +77,7 @@ def quantities_of(reading: Any, quantities: Sequence[Any]) -> tuple[str, ...]:
 
 
 class Readings:
-    """Computes readings of a part of a run, from `first` to `last`, with their derivatives in M directions.
+    """Computes extreme values, means and similar results between two times, with derivatives in M directions.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ class Readings:
         return points[0].value, slopes[0] + 0.0 * slopes.sum(axis=0)  # NaN if it is NaN at one of the points
 
     def _at(self, extremes: Extremes, place: Place) -> np.ndarray:
-        """Return the derivatives (M,) of the value at a place, which moves with an event at an end of a segment."""
+        """Return the derivatives (M,) of an extreme value at a point; an event may move this point."""
         found, is_after = self._found, place.where == START
         shift = None
         if place.where in (START, END):
@@ -201,7 +201,7 @@ class Readings:
         return value, total + self._jumps(names, size)
 
     def _jumps(self, names: Sequence[str], size: float) -> np.ndarray:
-        """Return the sum (M,) of (q- - q+) dt over the events of the part of the run, for a product q."""
+        """Return the sum (M,) of (q- - q+) dt over the events of this part of the run; q is a product of quantities."""
         solution, found, total = self._solution, self._found, np.zeros(self._found.width)
         segments = solution._segments
         for number in range(1, len(segments)):
@@ -222,7 +222,7 @@ class Readings:
         return total
 
     def _product(self, names: Sequence[str], number: int, end: int) -> float:
-        """Return the value of a product at the start (0) or end (-1) of a segment."""
+        """Return the value of a product of quantities at the start (0) or the end (-1) of a segment."""
         segment = self._solution._segments[number]
         s, x = segment.s[[end]], segment.x[[end]]
         known = [name for name in names if name != TIME]

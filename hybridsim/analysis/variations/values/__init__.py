@@ -1,1 +1,1 @@
-"""This package computes derivatives of the values in formulas: parameters, then inputs, then the run-time vector."""
+"""This package computes derivatives of all values in a model's formulas, such as parameters and inputs."""

@@ -20,7 +20,7 @@ _REMEDY = "move the run off this point, or write a smooth function, such as sqrt
 def no_derivative(
     system: System, title: str, by: Sequence[str], t: float, x: np.ndarray, states: Sequence[str]
 ) -> UsageError:
-    """Return the error for a function without a derivative by the names `by` at time t and states x (n,).
+    """Return the error for a function that has no derivative with respect to some names at time t.
 
     title : the function, in a sentence. states : names of the states whose rates it contains, or none.
     """
@@ -37,7 +37,7 @@ def no_derivative(
 
 
 def _edges(system: System, states: Sequence[str], values: Mapping[str, float]) -> Iterator[str]:
-    """Yield the functions in the rates of some states, or in all rates and guards, that are at a kink or edge."""
+    """Yield the functions in a model's rates and guards that have no derivative at the given values."""
     model = system.written
     if model.flow is not None:
         return

@@ -1,4 +1,4 @@
-"""This module computes derivatives of parameter values and initial values by chosen parameters."""
+"""This module computes derivatives of parameters and initial values with respect to chosen parameters."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from hybridsim.model import Model
 
 
 def value_slopes(model: Model, chosen: Sequence[str]) -> np.ndarray:
-    """Return the derivatives (P, C) of all parameters by the C chosen parameters."""
+    """Return the derivatives (P, C) of all parameters with respect to the C chosen parameters."""
     names = [p.name for p in model.parameters]
     slopes = {name: np.zeros(len(chosen)) for name in names}
     values = model.parameter_values()
@@ -40,7 +40,7 @@ def value_slopes(model: Model, chosen: Sequence[str]) -> np.ndarray:
 
 
 def start_slopes(expressions: Sequence[Expression], model: Model, by_parameter: np.ndarray) -> np.ndarray:
-    """Return the derivatives of initial values by the chosen parameters, one row per expression."""
+    """Return the derivatives of initial values with respect to the chosen parameters, one row per expression."""
     slopes = {p.name: row for p, row in zip(model.parameters, by_parameter, strict=True)}
     values = model.parameter_values()
     rows = [expression_slope(e, values, slopes, by_parameter.shape[1]) for e in expressions]
@@ -50,7 +50,7 @@ def start_slopes(expressions: Sequence[Expression], model: Model, by_parameter: 
 def expression_slope(
     expression: Expression, values: Mapping[str, float], slopes: Mapping[str, np.ndarray], width: int
 ) -> np.ndarray:
-    """Return derivatives (width,) of an expression by the chosen parameters, by the chain rule."""
+    """Return derivatives (width,) of an expression with respect to the chosen parameters, by the chain rule."""
     total = np.zeros(width)
     for name in sorted(expression.names):
         if slopes[name].any():
@@ -59,7 +59,7 @@ def expression_slope(
 
 
 def _derivative(expression: Expression, name: str, values: Mapping[str, float]) -> float:
-    """Return the derivative of an expression by one name; at a kink or root, return the limit from both sides."""
+    """Return the derivative of an expression with respect to one name; at a kink, return the limits from both sides."""
     found = _slope(expression, name)
     if not any(is_at_edge(node, values) for node in ast.walk(expression.tree) if isinstance(node, ast.expr)):
         return evaluate(found, values)

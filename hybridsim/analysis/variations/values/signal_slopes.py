@@ -1,4 +1,4 @@
-"""This module computes derivatives of inputs by parameters: of their coefficients and of the times of their knots."""
+"""This module computes derivatives of inputs with respect to parameters, including the times of their knots."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class SignalSlopes:
         self.is_fixed = not any(each.any() for each in self._slope.values())
 
     def coefficients(self, origin: float, slots: np.ndarray) -> np.ndarray:
-        """Return the derivatives (6, Q) of the coefficients of the piece that is valid just after an instant."""
+        """Return the derivatives (6, Q) of the coefficients that describe an input just after an instant."""
         found, kind, d, v = np.zeros((len(slots), self.width)), self.declared.kind, self._slope, self._value
         if kind == "wave" and self.declared.shape == "sine":
             period = v["period"]
@@ -75,7 +75,7 @@ class SignalSlopes:
         return np.zeros(self.width)
 
     def _corner(self, t: float) -> tuple[float, float, float]:
-        """Return the corner of a wave's shape at the knot at time t: fraction of the period, value and slope."""
+        """Return the corner of a wave at time t: its fraction of the period, its value and the slope after it."""
         periods = (t - self._value["phase"]) / self._value["period"]
         return min(self.signal.corners, key=lambda corner: abs(math.remainder(periods - corner[0], 1.0)))
 
@@ -87,7 +87,7 @@ class SignalSlopes:
         return found
 
     def _chirp(self, t: float, is_inside: bool) -> np.ndarray:
-        """Return the derivatives (4, Q) of angle, rate, bend and amplitude of a chirp."""
+        """Return the derivatives (4, Q) of the angle of a chirp, its first and second derivative, and its amplitude."""
         d, v = self._slope, self._value
         end, rise = v["duration"], v["f1"] - v["f0"]
         d_rise = d["f1"] - d["f0"]

@@ -1,4 +1,4 @@
-"""This module computes derivatives of an input of kind "table" by its values.
+"""This module computes derivatives of an input of kind "table" with respect to its values.
 
 A piece of a table is linear in the values, also with cubic interpolation. Its derivative by one value is the piece of
 the table that has this value 1 and all others 0.
@@ -53,7 +53,7 @@ class TableSlopes:
         self.value, self._unit = declared.values[index], Signal(replace(declared, values=values), {})
 
     def coefficients(self, origin: float) -> np.ndarray:
-        """Return the derivatives (6,) of the coefficients of the piece that holds from an instant on."""
+        """Return the derivatives (6,) of the coefficients that describe a table just after an instant."""
         found = np.zeros(SIGNAL_SLOTS)
         found[:4] = self._unit.piece(Instant(origin), True)[:4]
         return found

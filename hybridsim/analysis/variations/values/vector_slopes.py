@@ -70,7 +70,7 @@ class VectorSlopes:
         return self.seeds(p)[n + 1 :, n + 1 :]
 
     def seeds(self, p: np.ndarray) -> np.ndarray:
-        """Return derivatives of the formulas' arguments by states, local time and all constants."""
+        """Return derivatives of the formulas' arguments with respect to states, local time and all constants."""
         layout, found = self.system.layout, self._fixed.copy()
         below = found[self.system.n + 1 :, self.system.n + 1 + layout.discrete :]
         P = layout.parameters
@@ -91,7 +91,7 @@ class VectorSlopes:
         return np.array([*self.system.values.values(), *(table.value for _, table in self._tables)])
 
     def lifted(self, p: np.ndarray, d: np.ndarray, Yd: np.ndarray, G: np.ndarray) -> list[Any]:
-        """Return the run-time vector as dual numbers in M directions.
+        """Return the run-time values of a model as dual numbers in M directions.
 
         d, Yd : values (d,) and derivatives (d, M) of the discrete states. G (P + V, M) : of the others.
         """
