@@ -229,7 +229,7 @@ def tables_of(
 
     The tables are made once for each set of parameter values and each horizon, the order of magnitude of the longest
     possible segment. is_scaled: whether units have the length of pieces of inputs. The scratch arrays serve all tables
-    of one shape. Return None if there are no tables.
+    of one form. Return None if there are no tables.
     """
     last = system.tables.get((horizon, is_scaled))
     if last is not None and last[0] is modes:  # the values of a system's parameters do not change
@@ -237,7 +237,7 @@ def tables_of(
     made = _made(system, modes, p, horizon, None if last is None else last[2], is_scaled)
     found = None
     if made is not None:
-        found = made.tables, made.rows.form[-1], spare_scratch(system, made.rows.form, len(made.flows))
+        found = made.tables, made.rows.form[-1], spare_scratch(system, made.rows.form)
     system.tables[horizon, is_scaled] = (modes, found, made)
     return found
 

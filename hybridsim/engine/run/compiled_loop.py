@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 
 from hybridsim.engine.events.compiled.known_time import (
+    GOES_ON,
     KNOWN,
     SEGMENTS,
     STEPS,
     store_known_times,
 )
-from hybridsim.engine.events.compiled.scratch import functions_of
+from hybridsim.engine.events.compiled.scratch import IS_WANTED, functions_of
 from hybridsim.engine.events.monitor_corners import MonitorCorners
 from hybridsim.engine.events.outcome import Outcome
 from hybridsim.engine.events.state import HybridState
@@ -125,9 +126,8 @@ class CompiledLoop:
         """Allocate new arrays for later calls, because the trajectory keeps the arrays of earlier calls."""
         self.used = (0, 0)  # used rows of steps, and of segments
         self.memory: tuple[np.ndarray, ...] | None = None
-        self._packed: tuple[tuple[int, int], list[Any]] | None = (
-            None  # used rows, and packs of the rows behind them
-        )
+        # used rows, and packs of the rows behind them
+        self._packed: tuple[tuple[int, int], list[Any]] | None = None
 
     @property
     def place(self) -> tuple[np.ndarray, ...]:
@@ -157,25 +157,13 @@ class CompiledLoop:
     def go(self, origin: Instant, state: HybridState, target: Instant) -> KernelRun | None:
         """Call the kernel without storing the result in the trajectory; return None if this is impossible."""
         kernels, tape_cache = self.kernels, self.tape_cache
-        tape_cache.surround(state.z)
-        tapes = tape_cache.tapes  # read once, because another thread may replace them
+        tapes = tape_cache.with_modes(state.z)
         known = kernels.part_of(self.times_ahead.after(origin).up_to(target)) if self.times_ahead else None
         found = kernels.tables(tapes, state, origin, target)
         if found is None:
             return None
         lin, spare = found
-        if self.memory is None:
-            key = self.steps, kernels.columns
-            if key not in self._layouts:
-                kind = kernels.rows, kernels.keeps_starts, *kernels.fields()
-                self._layouts[key] = record_layout(kernels.system, self.steps, *kind)
-            self.array_layout = self._layouts[key]
-            self.memory, self._packed = self.array_layout.blank(), None
-        steps, first = self.used
-        if self._packed is None or self._packed[0] != self.used:
-            skipped = skipped_rows(first, steps, len(kernels.rows._fields))
-            self._packed = self.used, self.array_layout.packed(self.memory, skipped)
-        record, rows = self._packed[1]
+        record, rows = self._record()
         try:
             arrays = spare.pop()
         except IndexError:
@@ -196,23 +184,47 @@ class CompiledLoop:
         model = arrays.model
         if model.tapes is not tapes or model.lin is not lin:
             model = replaced(model, tapes=tapes, lin=lin)
-        began = perf_counter()
-        code = _event_loop(model, call, arrays.as_packed, arrays.work, record, opaque(own), opaque(rows))
-        seconds = perf_counter() - began
+        seconds = 0.0
+        while True:
+            began = perf_counter()
+            code = _event_loop(model, call, arrays.as_packed, arrays.work, record, opaque(own), opaque(rows))
+            seconds += perf_counter() - began
+            if not (lacks_tapes := arrays.work.int_slots[IS_WANTED] != 0):
+                break
+            more = tape_cache.with_modes(arrays.work.wanted)
+            found = kernels.tables(more, state, origin, target)
+            if found is None or found[1] is not spare:
+                break  # the next call has arrays of another form
+            tapes, lin = more, found[0]
+            model, own = replaced(model, tapes=tapes, lin=lin), kernels.with_tapes(own, tapes)
+            call.int_slots[GOES_ON] = 1
+        arrays.own = own
         if known is not None:
             call.known.kinds[0] = -1  # another run with these arrays may have no known times ahead
         if lin is NOT_LINEAR:
             tape_cache.look()
         result = kernels.end(own, tapes, lin)
         end, clock, counts = arrays.state.copy(), times[2:].tolist(), call.int_slots.tolist()
-        tape_cache.surround(arrays.state.z)
         spare.append(arrays)
-        # modes without tables may have ended the call
-        has_news = counts[SEGMENTS] > 0 and len(tape_cache.tapes.modes) != len(tapes.modes)
         return KernelRun(
-            self.system, self.array_layout, self.memory, steps, first, code, counts[STEPS], counts[SEGMENTS],
-            clock, end, has_news, seconds, result, known, counts[KNOWN], self.corners,
+            self.system, self.array_layout, self.memory, *self.used, code, counts[STEPS], counts[SEGMENTS],
+            clock, end, lacks_tapes, seconds, result, known, counts[KNOWN], self.corners,
         )  # fmt: skip
+
+    def _record(self) -> list[Any]:
+        """Return packs of the unused rows of the record, for all methods and for this method."""
+        kernels, (steps, first) = self.kernels, self.used
+        if self.memory is None:
+            key = self.steps, kernels.columns
+            if key not in self._layouts:
+                kind = kernels.rows, kernels.keeps_starts, *kernels.fields()
+                self._layouts[key] = record_layout(kernels.system, self.steps, *kind)
+            self.array_layout = self._layouts[key]
+            self.memory, self._packed = self.array_layout.blank(), None
+        if self._packed is None or self._packed[0] != self.used:
+            skipped = skipped_rows(first, steps, len(kernels.rows._fields))
+            self._packed = self.used, self.array_layout.packed(self.memory, skipped)
+        return self._packed[1]
 
     def advance(
         self, origin: Instant, outcome: Outcome, p: np.ndarray, target: Instant, record: Trajectory
@@ -232,7 +244,7 @@ class CompiledLoop:
             self._commit(run, record)
         if run.is_full or not self.kernels.is_continued:
             self.renew()
-        may_continue = run.is_full or run.has_news
+        may_continue = run.is_full or run.lacks_tapes
         end = ARRIVED if run.is_at_target else PAUSED if may_continue else BEFORE_SOMETHING
         return LoopResult(
             Instant(*run.clock), run.outcome, end, run.instants, run.owners, run.adopted, run.known_passed

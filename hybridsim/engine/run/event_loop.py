@@ -25,6 +25,7 @@ from hybridsim.engine.events.compiled.after_segment import (
     state_errors,
 )
 from hybridsim.engine.events.compiled.known_time import (
+    GOES_ON,
     KNOWN,
     ORIGIN_AT,
     PHASES_AT,
@@ -35,7 +36,7 @@ from hybridsim.engine.events.compiled.known_time import (
     set_inputs,
     set_origin,
 )
-from hybridsim.engine.events.compiled.scratch import EVENT_LOOP, KNOWN_TIME, ROW, SPREAD
+from hybridsim.engine.events.compiled.scratch import EVENT_LOOP, IS_WANTED, KNOWN_TIME, ROW, SPREAD
 from hybridsim.engine.native.kernels import (
     call_kernel,
     call_noinline,
@@ -57,6 +58,7 @@ FOLLOWED = 3  # returned by a segment kernel that has followed a segment
 # An event this close before a known time or the target may belong to that time: relative to the segment, to the time.
 _NEAR_KNOWN, _NEAR_IN_TIME = 2.0**-20, 2.0**-40
 NO_GUARD = -1  # the end of a segment without an event
+SINCE = 3  # index of `LoopCall.pace`
 
 
 class LoopModel(NamedTuple):
@@ -71,12 +73,14 @@ class LoopModel(NamedTuple):
 class LoopCall(NamedTuple):
     """The arrays of one call of the event loop, for all methods."""
 
-    int_slots: np.ndarray  # (6,) integers at ORIGIN_AT, ...
+    int_slots: np.ndarray  # (7,) integers at ORIGIN_AT, ...
     longest: np.ndarray  # (1,) longest segment
     times: np.ndarray  # (4,) target, and clock: the origin of the segment, which is advanced
     rates: np.ndarray  # (R,) rates of the angles
     scale: np.ndarray  # (n,) largest states on the segment
-    pace: np.ndarray  # (3,), see `is_crowded`
+    pace: (
+        np.ndarray
+    )  # (4,), see `is_crowded`, and at SINCE the time from the last event to the last known time after it
     known: Any  # `hybridsim.engine.events.compiled.known_time.KnownTimeArrays`
 
 
@@ -155,16 +159,20 @@ def event_loop(
 
     The numbers of committed steps and segments are in `call`. state: `StateArrays` at the start of the segment,
     advanced by the call, like the clock. work: `EventScratch`. record: `LoopRecord`. own, rows: packs of the method,
-    for its arrays and its record. A segment with more steps than fit is committed in parts.
+    for its arrays and its record. A segment with more steps than fit is committed in parts. A call ends if the event of
+    a segment needs modes without an instruction tape (`row_of`). The next call goes on from this segment as if nothing
+    had happened, if `ints[GOES_ON]` is set.
     """
     automata, tapes, ints = model.automata, model.tapes, call.int_slots
     target, clock, pace, scale, rates = call.times[:2], call.times[2:], call.pace, call.scale, call.rates
     x, x_error, z, p = state.x, state.x_error, state.z, state.p
     y, jumps, place = work.y, record.jumps, (ints[ORIGIN_AT], ints[PHASES_AT])
     before, after, known = jumps.shape[1] - 2, jumps.shape[1] - 1, call.known
-    pace[0], pace[1], pace[2] = math.inf, math.inf, 0.0
-    ints[STEPS] = ints[SEGMENTS] = ints[KNOWN] = step = i = 0
-    since = 0.0  # from the last event to the last known time after it
+    if ints[GOES_ON] == 0:
+        pace[0], pace[1], pace[2], pace[SINCE] = math.inf, math.inf, 0.0, 0.0
+        ints[STEPS] = ints[SEGMENTS] = ints[KNOWN] = 0
+    ints[GOES_ON] = work.int_slots[IS_WANTED] = 0
+    step, i, since = ints[STEPS], ints[SEGMENTS], pace[SINCE]
     is_ahead, is_rejected, k = False, False, find_modes(tapes, z)
     while True:
         bound = (target[0] - clock[0]) + (target[1] - clock[1])
@@ -212,6 +220,7 @@ def event_loop(
         at, error, slope, bend, is_ahead = end.at, end.error, end.slope, end.bend, end.is_ahead
         state_errors(automata, error, y, scale, x_error, z, work.slopes, work.y_error)
         work.float_slots[SPREAD], work.int_slots[ROW] = spread(end.steps, STAGES), k
+        gap, ratio, steady = pace[0], pace[1], pace[2]
         is_rejected = (
             is_crowded(since + s, clock, pace)
             or bound - s <= max(near, _NEAR_KNOWN * bound)
@@ -222,6 +231,8 @@ def event_loop(
         )
         if is_rejected or not resolve(model, at, error, fired, state, work):
             is_rejected, is_ahead = True, False  # the kernel of the segment returns STOPPED
+            if work.int_slots[IS_WANTED] != 0:
+                pace[0], pace[1], pace[2], pace[SINCE] = gap, ratio, steady, since
             continue
         put(work.x_after, jumps[i, after])
         since = 0.0

@@ -91,7 +91,7 @@ class KernelRun:
         is None after the segments are released. The call wrote from rows `first_step` and `first` on.
     code, steps, count : why the call ended, and the numbers of steps and segments.
     clock, end : the instant (high, low) at which it ended, and the state there.
-    has_news : whether it met modes without tables, so that another call may continue.
+    lacks_tapes : whether it ended before an event that needs more instruction tapes, so that another call continues.
     seconds : time in compiled code.
     result : further results of the method.
     known, passed : the known times ahead of the call, and how many it passed.
@@ -109,7 +109,7 @@ class KernelRun:
     count: int
     clock: list[float]
     end: HybridState
-    has_news: bool
+    lacks_tapes: bool
     seconds: float
     result: Any
     known: KnownTimes | None

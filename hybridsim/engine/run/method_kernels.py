@@ -59,7 +59,8 @@ class MethodKernels(ABC):
     6. A kernel may set origin and inputs of the next segment in ``state.p`` (`set_origin`, `set_inputs`), and return
        ``at = 0`` and ``is_ahead``. If ``start.is_ahead`` is set then, nothing has changed p since.
     7. If ``start.is_rejected`` is set, the last segment is not committed: restore what the kernel remembers of it, and
-       the outcome is STOPPED.
+       the outcome is STOPPED. If ``work.int_slots[IS_WANTED]`` is set, a later call repeats this segment: restore also
+       what the kernel counts.
     """
 
     loop: ClassVar[Callable[..., int]]
@@ -119,6 +120,10 @@ class MethodKernels(ABC):
 
     def begin(self, own: Any, tapes: Tapes) -> Any:
         """Write the settings of the run to the arrays before a call, and return the arrays."""
+        return self.with_tapes(own, tapes)
+
+    def with_tapes(self, own: Any, tapes: Tapes) -> Any:
+        """Return the arrays for a call that begins or goes on with the given instruction tapes."""
         return own
 
     def end(self, own: Any, tapes: Tapes, lin: Any) -> Any:
@@ -160,12 +165,12 @@ class CallArrays:
         self.work = work_space(system, len(lin.kinds), len(lin.factors))
         self.call: LoopCall = packed(
             LoopCall(
-                int_slots=np.zeros(6, dtype=np.int64),
+                int_slots=np.zeros(7, dtype=np.int64),
                 longest=np.zeros(1),
                 times=np.zeros(4),
                 rates=np.zeros(layout.phases),
                 scale=np.empty(system.n),
-                pace=np.empty(3),
+                pace=np.empty(4),
                 known=known_time_arrays(system),
             )
         )

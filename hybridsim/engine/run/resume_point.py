@@ -130,7 +130,7 @@ class ResumePoint:
         is_looked_at = self.setup.method.stable_to and (  # for stiffness
             self.counters.steps // STEPS_PER_LOOK < counters.steps // STEPS_PER_LOOK
         )
-        if not run.is_at_target or run.has_news or run.events or not run.count or is_looked_at:
+        if not run.is_at_target or run.lacks_tapes or run.events or not run.count or is_looked_at:
             loop.kernel_run = run
             return loop
         used, kernels = (run.first_step + run.steps, run.first + run.count + 1), loop.kernels

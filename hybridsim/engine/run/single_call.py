@@ -106,7 +106,7 @@ _cannot_accumulate = Precompiled(cannot_accumulate)
 
 def _is_over(system: System, kernel_run: KernelRun) -> bool:
     """Return whether one call certainly completed the run: no events accumulate, and no bounces are hidden."""
-    if not kernel_run.is_at_target or kernel_run.has_news or not kernel_run.count:
+    if not kernel_run.is_at_target or kernel_run.lacks_tapes or not kernel_run.count:
         return False
     fires = kernel_run.fires
     if not len(fires):

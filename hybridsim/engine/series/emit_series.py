@@ -179,7 +179,7 @@ def along_function(name: str, tape: ModeTape, order: int) -> str:
         for k in range(size):
             code.V[r, k] = code.read("%x", i * size + k)
     code.V[tape.time, 0], code.V[tape.time, 1] = Value(code, "%s"), 1.0
-    rows = np.array(live_rows(list(tape.rows), set(tape.guards)), dtype=object).reshape(-1, 5)
+    rows = live_rows(tape.rows, tape.guards).astype(object)
     for k in range(size):
         code.advance(rows, code.V, k)
     code.write("%g", tape.guards, size)

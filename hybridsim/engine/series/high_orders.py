@@ -61,7 +61,8 @@ def high_rows(
     """Return the rows that compute the states and the guards at high orders."""
     made = _Rewriting(rows, states, rates, set(guard_registers))
     integrals = [made.scaled(rate).row(INTEGRATE, state) for state, rate in zip(states, rates, strict=True)]
-    return [*live_rows(made.rows, made.guard_registers | {row[1] for row in integrals}), *integrals]
+    live = live_rows(made.rows, made.guard_registers | {row[1] for row in integrals})
+    return [*map(tuple, live.tolist()), *integrals]
 
 
 class _Rewriting:
@@ -73,7 +74,7 @@ class _Rewriting:
         self.guard_registers = guard_registers
         self._of = {row[4]: row for row in rows}
         self._states = set(states)
-        self._unchanged = set(live_rows(list(rows), guard_registers))
+        self._unchanged = set(map(tuple, live_rows(rows, guard_registers).tolist()))
         self._readers = Counter([*(a for row in rows for a in arguments_of(row)), *rates])
         self._forms: dict[int, _Scaled] = {}
         cycles = self._cycles_after(dict.fromkeys(states, 0))

@@ -7,7 +7,7 @@ one multiplication per order instead of a convolution.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from types import MappingProxyType
@@ -15,13 +15,11 @@ from typing import Any
 
 import numpy as np
 
+from hybridsim.engine.native.kernels import inlined, kernel
 from hybridsim.engine.series import operations as ops
 
 CONSTANT, LINEAR, SERIES = range(3)  # dependence of a register on time
 PAIRED = (ops.SINCOS, ops.SINHCOSH, ops.TANGENT)  # operations with a companion in the next register
-# operations on one register; the others use two
-_ONE = (ops.COPY, ops.NEG, ops.ABS, ops.SIGN, ops.NOT, ops.EXP, ops.SQRT, *PAIRED)
-_LINEAR_OPERATIONS = (ops.ADD, ops.SUB, ops.NEG)
 
 
 @dataclass(frozen=True)
@@ -83,45 +81,78 @@ def separate_registers(tape: dict[str, Any]) -> dict[int, int]:
 
 
 def optimised(
-    tape: dict[str, Any],
-    rows: Iterable[tuple[int, ...]],
-    active: Iterable[int],
-    separate: Mapping[int, int] = MappingProxyType({}),
+    tape: dict[str, Any], rows: Any, active: Any, separate: Mapping[int, int] = MappingProxyType({})
 ) -> OptimisedTape:
-    """Return the optimised rows of one combination of modes and its active guards."""
-    kind = dict.fromkeys(tape["states"], SERIES) | {tape["time"]: LINEAR}
-    same: dict[int, int] = {}  # copy -> original register
-    constant_rows: list[tuple[int, ...]] = []
-    series_rows: list[tuple[int, ...]] = []
-    for op, *operands, out in rows:
+    """Return the optimised rows (R, 5) of one combination of modes and its active guards."""
+    rows = row_array(rows)
+    kind = np.zeros(
+        tape["registers"] + len(separate), dtype=np.int64
+    )  # dependence on time, CONSTANT at first
+    same = np.arange(len(kind))  # copy -> original register
+    apart = same.copy()
+    apart[list(separate)] = list(separate.values())
+    kind[list(tape["states"])] = SERIES
+    if tape["time"] >= 0:
+        kind[tape["time"]] = LINEAR
+    constant_rows, series_rows = np.empty_like(rows), np.empty_like(rows)
+    constants, series = _sorted_rows(rows, apart, kind, same, constant_rows, series_rows)
+    states, derivatives, guards, surfaces, monitors = (
+        same[np.array(tape[key], dtype=np.int64)]
+        for key in ("states", "derivatives", "guards", "surfaces", "monitors")
+    )
+    live = np.concatenate([derivatives, surfaces, monitors, guards[np.array(active, dtype=np.int64)]])
+    live_series_rows = live_rows(series_rows[:series], live)
+    read = np.concatenate([live, live_series_rows[:, 1:4].ravel()])
+    return OptimisedTape(
+        live_rows(constant_rows[:constants], read),
+        live_series_rows,
+        states,
+        derivatives,
+        guards,
+        surfaces,
+        monitors,
+    )
+
+
+@kernel
+def _sorted_rows(
+    rows: Any, apart: Any, kind: Any, same: Any, constant_rows: Any, series_rows: Any
+) -> tuple[int, int]:
+    """Sort rows into rows of constants and rows of series without copies, and return how many there are of each.
+
+    apart: separate registers of values that are constant in these modes. kind, same: dependence on time, and the
+    register in place of each copied register; both are updated.
+    """
+    constants = series = 0
+    for i in range(rows.shape[0]):
+        op, out = rows[i, 0], rows[i, 4]
         count = _registers(op)
-        a, b, c = (same.get(r, r) if i < count else r for i, r in enumerate(operands))
+        a, b, c = same[rows[i, 1]], rows[i, 2], rows[i, 3]
+        if count > 1:
+            b = same[b]
+        if count > 2:
+            c = same[c]
         if op == ops.COPY:
             same[out] = a
             continue
-        kinds = [kind.get(r, CONSTANT) for r in (a, b, c)[:count]]
-        kind[out] = _kind(op, kinds)
-        if op in PAIRED:
-            kind[out + 1] = kind[out]
+        first = kind[a]
+        second = kind[b] if count > 1 else first
+        third = kind[c] if count > 2 else first
+        width = 2 if _is_paired(op) else 1
+        for r in range(out, out + width):
+            kind[r] = _kind_of(op, first, second, third)
         if kind[out] == CONSTANT:
-            for r in (out, out + 1) if op in PAIRED else (out,):
-                same[r] = separate.get(r, r)
+            for r in range(out, out + width):
+                same[r] = apart[r]
                 kind[same[r]] = CONSTANT
-            constant_rows.append((op, a, b, c, same[out]))
+            into, k, op, out = constant_rows, constants, op, same[out]
+            constants += 1
         else:
-            series_rows.append((*_special(op, a, b, c, kinds), out))
-
-    def registers(key: str) -> np.ndarray:
-        return np.array([same.get(r, r) for r in tape[key]], dtype=np.int64)
-
-    states, derivatives, guards = registers("states"), registers("derivatives"), registers("guards")
-    surfaces, monitors = registers("surfaces"), registers("monitors")
-    live = {*derivatives, *surfaces, *monitors, *(guards[g] for g in active)}
-    live_series_rows = live_rows(series_rows, live)
-    constants = live_rows(constant_rows, live | {r for row in live_series_rows for r in row[1:4]})
-    return OptimisedTape(
-        _array(constants), _array(live_series_rows), states, derivatives, guards, surfaces, monitors
-    )
+            into, k = series_rows, series
+            op, a, b = _special(op, a, b, count, first, second)
+            series += 1
+        into[k, 0], into[k, 1], into[k, 2], into[k, 3], into[k, 4] = op, a, b, c, out
+    return constants, series
 
 
 def has_corners(tape: dict[str, Any]) -> bool:
@@ -144,39 +175,66 @@ def has_corners(tape: dict[str, Any]) -> bool:
     return False
 
 
-def _array(rows: list[tuple[int, ...]]) -> np.ndarray:
+def row_array(rows: Any) -> np.ndarray:
+    """Return rows as an array (R, 5)."""
     return np.array(rows, dtype=np.int64).reshape(-1, 5)
 
 
+@inlined
 def _registers(op: int) -> int:
     """Return how many of a, b and c in a row are registers; the other entries are flags of the operation."""
-    return 1 if op in _ONE else 3 if op == ops.SELECT else 2
+    if op == ops.SELECT:
+        return 3
+    is_of_one = op == ops.COPY or op == ops.NEG or op == ops.ABS or op == ops.SIGN or op == ops.NOT
+    return 1 if is_of_one or op == ops.EXP or op == ops.SQRT or _is_paired(op) else 2
+
+
+@inlined
+def _is_paired(op: int) -> bool:
+    """Return whether an operation has a companion in the next register."""
+    return op == ops.SINCOS or op == ops.SINHCOSH or op == ops.TANGENT
+
+
+@inlined
+def _kind_of(op: int, first: int, second: int, third: int) -> int:
+    """Return the dependence of a result on time; an operand that does not exist has the kind of the first one."""
+    highest = max(first, second, third)
+    if highest != LINEAR:
+        return highest
+    lowest = min(first, second, third)
+    is_scaled = (op == ops.MUL and lowest == CONSTANT) or (op == ops.DIV and second == CONSTANT)
+    return LINEAR if is_scaled or op == ops.ADD or op == ops.SUB or op == ops.NEG else SERIES
 
 
 def _kind(op: int, kinds: list[int]) -> int:
-    highest = max(kinds)
-    if highest == LINEAR:
-        scaled = (op == ops.MUL and min(kinds) == CONSTANT) or (op == ops.DIV and kinds[1] == CONSTANT)
-        return LINEAR if scaled or op in _LINEAR_OPERATIONS else SERIES
-    return highest
+    """Return the dependence of a result on time from the kinds of its operands."""
+    return _kind_of(op, kinds[0], *(kinds[1:3] + kinds[:1] * 2)[:2])
 
 
-def _special(op: int, a: int, b: int, c: int, kinds: list[int]) -> tuple[int, int, int, int]:
+@inlined
+def _special(op: int, a: int, b: int, count: int, first: int, second: int) -> tuple[int, int, int]:
     """Return a cheaper operation for an operation on a constant, or on an angle that is linear in time."""
-    if op == ops.SINCOS and kinds[0] == LINEAR:
-        return ops.SINCOS_LINEAR, a, b, c
-    if len(kinds) == 2 and kinds[1] == CONSTANT:
-        cheap = {
-            ops.ADD: ops.ADD_CONSTANT,
-            ops.SUB: ops.SUB_CONSTANT,
-            ops.MUL: ops.SCALE,
-            ops.DIV: ops.DIVIDE_BY,
-        }
-        return cheap.get(op, op), a, b, c
-    if len(kinds) == 2 and kinds[0] == CONSTANT:
-        cheap = {ops.ADD: ops.ADD_CONSTANT, ops.SUB: ops.CONSTANT_SUB, ops.MUL: ops.SCALE}
-        return (cheap[op], b, a, c) if op in cheap else (op, a, b, c)
-    return op, a, b, c
+    if op == ops.SINCOS and first == LINEAR:
+        return ops.SINCOS_LINEAR, a, b
+    if count != 2:
+        return op, a, b
+    if second == CONSTANT:
+        if op == ops.ADD:
+            op = ops.ADD_CONSTANT
+        elif op == ops.SUB:
+            op = ops.SUB_CONSTANT
+        elif op == ops.MUL:
+            op = ops.SCALE
+        elif op == ops.DIV:
+            op = ops.DIVIDE_BY
+    elif first == CONSTANT:
+        if op == ops.ADD:
+            return ops.ADD_CONSTANT, b, a
+        if op == ops.SUB:
+            return ops.CONSTANT_SUB, b, a
+        if op == ops.MUL:
+            return ops.SCALE, b, a
+    return op, a, b
 
 
 def arguments_of(row: tuple[int, ...]) -> tuple[int, ...]:
@@ -184,13 +242,23 @@ def arguments_of(row: tuple[int, ...]) -> tuple[int, ...]:
     return row[1 : 2 if row[0] >= ops.ADD_CONSTANT else 1 + _registers(row[0])]
 
 
-def live_rows(rows: list[tuple[int, ...]], live: set[int]) -> list[tuple[int, ...]]:
-    """Return the rows on which the given registers depend, in order."""
-    live = set(live)
-    selected = []
-    for row in reversed(rows):
-        out = row[4]
-        if out in live or (row[0] in (*PAIRED, ops.SINCOS_LINEAR) and out + 1 in live):
-            selected.append(row)
-            live |= set(row[1:4])  # flags among them can only keep an unneeded row
-    return selected[::-1]
+def live_rows(rows: Any, live: Any) -> np.ndarray:
+    """Return the rows (R, 5) on which the given registers depend, in order."""
+    rows, wanted = row_array(rows), np.array(list(live), dtype=np.int64)
+    is_live = np.zeros(2 + max(rows.max(initial=0), wanted.max(initial=0)), dtype=np.bool_)
+    is_live[wanted] = True
+    is_selected = np.empty(len(rows), dtype=np.bool_)
+    _select_live(rows, is_live, is_selected)
+    return rows[is_selected]
+
+
+@kernel
+def _select_live(rows: Any, is_live: Any, is_selected: Any) -> None:
+    """Mark the rows on which live registers depend; the registers that these rows read become live."""
+    for i in range(rows.shape[0] - 1, -1, -1):
+        op, out = rows[i, 0], rows[i, 4]
+        has_companion = _is_paired(op) or op == ops.SINCOS_LINEAR
+        is_selected[i] = is_live[out] or (has_companion and is_live[out + 1])
+        if is_selected[i]:
+            for j in range(1, 4):  # flags among them can only keep an unneeded row
+                is_live[rows[i, j]] = True

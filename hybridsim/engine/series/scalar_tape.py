@@ -71,6 +71,7 @@ def scalar_tape(
             remedy="use a smooth expression",
         )
     tape: dict[str, Any] = {
+        "registers": builder.count,
         "states": inputs,
         "time": clock,
         "derivatives": [],

@@ -180,8 +180,7 @@ class TangentTape:
                 tape.surfaces[list(surfaces)],
             ]
         ).astype(np.int64)
-        rows = [tuple(row) for row in np.concatenate([tape.constant_rows, tape.rows]).tolist()]
-        self._rows = np.array(live_rows(rows, set(self._outputs.tolist())), dtype=np.int64).reshape(-1, 5)
+        self._rows = live_rows(np.concatenate([tape.constant_rows, tape.rows]), self._outputs)
         self._registers = system.registers
 
     def is_same(self, other: TangentTape) -> bool:

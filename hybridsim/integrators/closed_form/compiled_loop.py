@@ -42,6 +42,7 @@ class ClosedFormKernels(MethodKernels):
         # as in `ClosedFormArrays.hints` after the last call
         self.hints = np.zeros((0, system.guard_count))
         self.tape_cache = tape_cache_of(system)
+        self.tape_cache.with_few()
         self.columns = 0  # number of modal coordinates
         self.lin: LinearTables
 
@@ -75,14 +76,14 @@ class ClosedFormKernels(MethodKernels):
         tables, widest = self.lin, self.lin.values.shape[1]
         return packed(
             ClosedFormArrays(
-                points=np.zeros(1, dtype=np.int64),
+                points=np.zeros(2, dtype=np.int64),
                 c=np.zeros(widest, dtype=complex),
                 v=np.zeros(widest, dtype=complex),
                 sizes=vector_of(widest),
                 terms=np.zeros((2, BOUND_TERMS)),
                 starts=np.zeros((self.system.guard_count, BOUND_TERMS + 2)),
-                hints=np.zeros(tables.farthest.shape),
-                former=np.zeros(tables.farthest.shape[1]),
+                hints=np.zeros((max(len(tables.counts), len(self.hints)), self.system.guard_count)),
+                former=np.zeros(self.system.guard_count),
                 series=np.zeros((2, tables.flows.shape[1])),
             )
         )
@@ -93,10 +94,18 @@ class ClosedFormKernels(MethodKernels):
 
     def begin(self, own: Any, tapes: Tapes) -> Any:
         """Write the last zeros of guards in this run to the arrays, as initial guesses."""
-        known = len(self.hints)
+        own, known = self.with_tapes(own, tapes), len(self.hints)
         own.hints[known:] = 0.0
         if known:
             own.hints[:known] = self.hints
+        return own
+
+    def with_tapes(self, own: Any, tapes: Tapes) -> Any:
+        """Return the arrays with guesses for all combinations of modes; added ones have no guess."""
+        former, known = own, len(own.hints)
+        if known < max(len(self.lin.counts), len(self.hints)):
+            own = self.arrays()
+            own.hints[:known], own.points[:] = former.hints, former.points
         return own
 
     def end(self, own: Any, tapes: Tapes, lin: Any) -> Any:

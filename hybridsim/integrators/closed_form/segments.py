@@ -54,7 +54,9 @@ _DONE = -1.0  # replaces a guard's size if its first zero is known
 class ClosedFormArrays(NamedTuple):
     """The arrays of the segment kernel, for J modal coordinates and K combinations of modes."""
 
-    points: np.ndarray  # (1,) number of points from which guards were followed
+    points: (
+        np.ndarray
+    )  # number of points from which guards were followed, now and at the start of the segment
     c: np.ndarray  # (J,) modal coordinates
     v: np.ndarray  # (J,) modal coordinates
     sizes: np.ndarray  # (J,) sizes of modal coordinates
@@ -144,9 +146,11 @@ def closed_form_segment(
     k, bound, is_ahead, is_rejected = start
     number = ints[SEGMENTS]
     if is_rejected:
+        own.points[0] = own.points[1]
         return stopped(hints, k, former)
     if number == 0:
         own.points[0] = 0
+    own.points[1] = own.points[0]
     if own.points[0] > POINTS:
         return not_followed(FULL)
     automata, tapes, functions = model.automata, model.tapes, called_by(work)

@@ -50,7 +50,8 @@ class RungeKuttaArrays(NamedTuple):
     settings: Any  # `RungeKuttaSettings`
     parts: Any  # `hybridsim.engine.system.programs.guard_parts.Parts` of the tapes
     codes: Any  # `hybridsim.engine.system.programs.ends_code.EndsCodes` of the tapes
-    first_step: np.ndarray  # length of the first step (0: unknown), which is cleared after use
+    # length of the first step (0: unknown), which is cleared after use, and its value at the start of the segment
+    first_step: np.ndarray
     V: np.ndarray
     W: np.ndarray
     a: np.ndarray
@@ -82,7 +83,7 @@ class RungeKuttaArrays(NamedTuple):
     orders: np.ndarray
     floors: np.ndarray
     memory: np.ndarray
-    counts: np.ndarray
+    counts: np.ndarray  # tried and rejected steps, and both at the start of the segment
 
 
 class RungeKuttaKernels(MethodKernels):
@@ -129,7 +130,7 @@ class RungeKuttaKernels(MethodKernels):
                 settings=self.settings,
                 parts=self.parts.of(tapes),
                 codes=self.codes.of(tapes),
-                first_step=np.empty(1),
+                first_step=np.empty(2),
                 V=np.zeros((registers, columns)),
                 W=np.zeros((registers, columns)),
                 a=np.empty(columns),
@@ -156,7 +157,7 @@ class RungeKuttaKernels(MethodKernels):
                     for name in ("guard_registers", "numbers", "sides", "orders")
                 },
                 memory=np.empty(3),
-                counts=np.zeros(2, dtype=whole),
+                counts=np.zeros(4, dtype=whole),
             )
         )
 
@@ -167,12 +168,16 @@ class RungeKuttaKernels(MethodKernels):
     def begin(self, own: Any, tapes: Tapes) -> Any:
         """Write the settings and the compiled operations of the run to the arrays."""
         own.first_step[0], own.counts[:] = self.first_step, 0
-        return replaced(own, settings=self.settings, parts=self.parts.of(tapes), codes=self.codes.of(tapes))
+        return replaced(self.with_tapes(own, tapes), settings=self.settings)
+
+    def with_tapes(self, own: Any, tapes: Tapes) -> Any:
+        """Return the arrays with the guard instructions and the machine code of the instruction tapes."""
+        return replaced(own, parts=self.parts.of(tapes), codes=self.codes.of(tapes))
 
     def end(self, own: Any, tapes: Tapes, lin: Any) -> Any:
         """Return the numbers of tried and rejected steps, and the length of the next step."""
         self.codes.look(tapes, own.codes)
-        return (*own.counts.tolist(), float(own.first_step[0]))
+        return (*own.counts[:2].tolist(), float(own.first_step[0]))
 
     def count(self, counters: Counters, steps: int, result: Any) -> None:
         """Add the cost of the steps to the counters of the run."""

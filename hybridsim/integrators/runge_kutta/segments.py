@@ -12,7 +12,7 @@ from typing import Any
 from hybridsim.engine.events.compiled.after_segment import fill_guard_series, state_errors
 from hybridsim.engine.events.compiled.at_end import may_vanish
 from hybridsim.engine.events.compiled.known_time import SEGMENTS, STEPS
-from hybridsim.engine.events.compiled.scratch import called_by
+from hybridsim.engine.events.compiled.scratch import IS_WANTED, called_by
 from hybridsim.engine.native.kernels import call, call_noinline, call_series, inlined, kernel
 from hybridsim.engine.native.loop_hints import put
 from hybridsim.engine.native.time_grid import on_the_grid
@@ -249,10 +249,14 @@ def runge_kutta_segment(
     """
     k, bound, _, is_rejected = start
     n_steps = first_step = loop.int_slots[STEPS]
+    counts, first = own.counts, own.first_step
     if is_rejected:
+        if work.int_slots[IS_WANTED] != 0:
+            counts[0], counts[1], first[0] = counts[2], counts[3], first[1]
         return not_followed(STOPPED)
+    counts[2], counts[3], first[1] = counts[0], counts[1], first[0]
     automata, tapes, inputs, functions = model.automata, model.tapes, model.inputs, called_by(work)
-    settings, parts, codes, first = own.settings, own.parts, own.codes, own.first_step
+    settings, parts, codes = own.settings, own.parts, own.codes
     tableau, hermite, atol = settings.tableau, settings.hermite, settings.atol
     orders, sizes = settings.leading_orders, settings.leading
     leading = (orders[0], sizes[0], sizes[1], orders[1], sizes[2])

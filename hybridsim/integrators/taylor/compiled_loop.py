@@ -14,6 +14,7 @@ from hybridsim.engine.record.series_block import SeriesBlock
 from hybridsim.engine.roots.defect_check import ahead_size
 from hybridsim.engine.run.method_kernels import MethodKernels, StepRows
 from hybridsim.engine.system.programs.code_cache import series_codes
+from hybridsim.engine.system.programs.high_parts import high_parts_of
 from hybridsim.engine.system.programs.mode_code import most_fading
 from hybridsim.engine.system.programs.mode_tables import Tapes, tape_cache_of
 from hybridsim.engine.system.series_at import series_order
@@ -32,6 +33,7 @@ class TaylorSettings(NamedTuple):
 class TaylorArrays(NamedTuple):
     """The arrays of the segment kernel, for R registers, order + 1 terms and G guards."""
 
+    high: Any  # `hybridsim.engine.system.programs.high_parts.HighParts` of the tapes
     codes: Any  # `hybridsim.engine.system.programs.series_code.Codes` of the tapes
     settings: Any  # `TaylorSettings`
     V: np.ndarray  # Taylor coefficients (R, order + 1) of all registers
@@ -65,15 +67,17 @@ class TaylorKernels(MethodKernels):
             np.array([rtol, tolerances.max_step]), np.array(tolerances.atol, dtype=float)
         )
         self.kind, self.columns = f"order {self.order}", system.n * (self.order + 1) + 2
-        self.codes = series_codes(system, self.order)
+        self.codes, self.high = series_codes(system, self.order), high_parts_of(system)
 
     def arrays(self) -> Any:
         """Return new arrays for one call of the compiled Taylor loop."""
         system, order, n = self.system, self.order, self.system.n
+        tapes = tape_cache_of(system).tapes
         registers, guards, fading = system.registers.count, system.guard_count, most_fading(system)
         return packed(
             TaylorArrays(
-                codes=self.codes.of(tape_cache_of(system).tapes),
+                high=self.high.of(tapes),
+                codes=self.codes.of(tapes),
                 settings=packed(TaylorSettings(np.empty(2), np.empty(n))),
                 V=np.zeros((registers, order + 1)),
                 W=np.zeros((registers, order + 1)),
@@ -97,7 +101,11 @@ class TaylorKernels(MethodKernels):
     def begin(self, own: Any, tapes: Tapes) -> Any:
         """Write the settings and the compiled operations of the run to the arrays."""
         own.settings.control[:], own.settings.atol[:] = self.settings
-        return replaced(own, codes=self.codes.of(tapes))
+        return self.with_tapes(own, tapes)
+
+    def with_tapes(self, own: Any, tapes: Tapes) -> Any:
+        """Return the arrays with the rows for high orders and the machine code of the instruction tapes."""
+        return replaced(own, high=self.high.of(tapes), codes=self.codes.of(tapes))
 
     def end(self, own: Any, tapes: Tapes, lin: Any) -> None:
         """Compile machine code for modes in which many steps were taken."""

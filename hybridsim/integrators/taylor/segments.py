@@ -103,7 +103,7 @@ def taylor_segment(
     side_now, order_now, floor_now = own.sides, own.orders, own.floors
     steps, series, n = rows.steps, rows.series, x.shape[0]
     tape = tapes.optimised[tapes.optimised_start[k] : tapes.optimised_start[k + 1]]
-    high = tapes.high[tapes.high_start[k] : tapes.high_start[k + 1]]
+    high = own.high.rows[own.high.start[k] : own.high.start[k + 1]]
     flow_registers = (inputs.time[0], inputs.states, tapes.derivatives[k])
     fading = tapes.fading[tapes.fading_start[k] : tapes.fading_start[k + 1]]
     code, values_code = codes.series[k], codes.values[k]

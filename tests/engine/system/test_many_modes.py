@@ -136,7 +136,7 @@ def test_tables_that_grew_are_those_made_at_once() -> None:
         np.zeros(len(system.automata), dtype=np.int64),
         *np.eye(len(system.automata), dtype=np.int64),
     ):
-        tape_cache.surround(z)
+        tape_cache.with_modes(z)
         made = linear_tables(system, tape_cache.tapes.modes, p, 100.0, made)
         assert made is not None
         steps.append(made)

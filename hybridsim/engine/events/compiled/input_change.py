@@ -13,8 +13,8 @@ import numpy as np
 from hybridsim.engine.events.choice.verdict import FINE, NO_SIDE
 from hybridsim.engine.events.compiled.guard_series import guard_series
 from hybridsim.engine.events.compiled.resolve_surface import row_verdict
-from hybridsim.engine.events.compiled.scratch import LocatedEvent
-from hybridsim.engine.events.compiled.start import StartScratch
+from hybridsim.engine.events.compiled.scratch import LocatedEvent, row_of
+from hybridsim.engine.events.compiled.start import StartScratch, judged
 from hybridsim.engine.events.state import HybridState
 from hybridsim.engine.native.kernels import ENABLED, Precompiled, inline_always, kernel
 from hybridsim.engine.native.loop_hints import put
@@ -22,9 +22,7 @@ from hybridsim.engine.native.struct_pack import packed
 from hybridsim.engine.series.bounded import run_series
 from hybridsim.engine.series.optimise import live_rows
 from hybridsim.engine.system.instant import Instant
-from hybridsim.engine.system.per_structure import per_structure, spare_scratch
-from hybridsim.engine.system.programs.mode_tables import tape_cache_of
-from hybridsim.engine.system.programs.modes_index import find_modes
+from hybridsim.engine.system.per_structure import per_structure
 from hybridsim.engine.system.system import System
 
 _LEAST = math.ulp(0.0)  # error of the time of zeros at an instant without an event
@@ -82,7 +80,7 @@ def admit_modes(
             return False
     if tape.surfaces.shape[0] > 0 and not _surfaces_stay(inputs, tape, pin_at, former, state, work):
         return False
-    k = find_modes(tapes, z)
+    k = row_of(tapes, z, work)
     if k < 0:
         return False
     put(z, work.before)
@@ -139,23 +137,19 @@ def changed_inputs(
     """
     if not _is_supported(system):
         return None
-    tapes, spare = tape_cache_of(system).tapes, spare_scratch(system, "start")
-    try:
-        scratch = spare.pop()
-    except IndexError:
-        scratch = StartScratch(system)
-    if scratch.modes is not tapes.modes:  # the tapes of more modes exist now
-        scratch = StartScratch(system)
-    changed, place = scratch.state, system.layout.discrete_slice
-    changed.memory[:] = state.memory
-    former = system.vector(instant, changed.p[place])
-    changed.p[:] = former
-    changed.p[place] = discrete
-    tape = _surface_tape(system, changed.z.tobytes())
-    is_certain = _admit_modes(
-        scratch.automata, scratch.tapes, system.registers.inputs, scratch.nothing, tape, system.layout.pin_at,
-        former, scratch.as_packed, scratch.work,
-    )  # fmt: skip
-    found = changed.copy() if is_certain else None
-    spare.append(scratch)
-    return found
+    place = system.layout.discrete_slice
+
+    def call(scratch: StartScratch) -> bool:
+        changed = scratch.state
+        changed.memory[:] = state.memory
+        former = system.vector(instant, changed.p[place])
+        changed.p[:] = former
+        changed.p[place] = discrete
+        tape = _surface_tape(system, changed.z.tobytes())
+        is_certain: bool = _admit_modes(
+            scratch.automata, scratch.tapes, system.registers.inputs, scratch.nothing, tape, system.layout.pin_at,
+            former, scratch.as_packed, scratch.work,
+        )  # fmt: skip
+        return is_certain
+
+    return judged(system, call)

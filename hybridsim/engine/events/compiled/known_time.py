@@ -27,8 +27,9 @@ from hybridsim.engine.system.instant import phase_of, two_sum
 from hybridsim.engine.system.known_times import MAX_KINDS, MAX_KNOWN_TIMES, START, KnownTimes
 from hybridsim.engine.system.system import System
 
-# Indices of the integers of a loop, `LoopCall.int_slots`; two of them count what is committed, the last the known times
-ORIGIN_AT, PHASES_AT, SIGNALS_AT, STEPS, SEGMENTS, KNOWN = range(6)
+# Indices of the integers of a loop, `LoopCall.int_slots`: three of them count committed steps and segments and known
+# times that were passed; the last says whether a call goes on with these.
+ORIGIN_AT, PHASES_AT, SIGNALS_AT, STEPS, SEGMENTS, KNOWN, GOES_ON = range(7)
 NO_RESET = -1
 
 

@@ -12,12 +12,11 @@ from typing import Any
 from hybridsim.engine.events.choice.joint_choice import NO_SCORE, NONE, is_settled, joint_choice, rank_of
 from hybridsim.engine.events.choice.verdict import FINE, NO_SIDE, UNDECIDED, verdict_with, zeros_of_surface
 from hybridsim.engine.events.compiled.guard_series import is_continuous
-from hybridsim.engine.events.compiled.scratch import ROW, called_by, located
+from hybridsim.engine.events.compiled.scratch import ROW, called_by, located, row_of
 from hybridsim.engine.linear.guard_coefficients import linear_coefficient, measure_point, rough_side
 from hybridsim.engine.native.kernels import call, inlined, kernel
 from hybridsim.engine.native.loop_hints import index, put, short_loop
 from hybridsim.engine.series.bounded import UNIT
-from hybridsim.engine.system.programs.modes_index import find_modes
 
 
 @inlined
@@ -92,7 +91,7 @@ def resolve_clear(automata: Any, tapes: Any, lin: Any, state: Any, work: Any, fi
         if mode == now or is_settled(score, rank, 1):
             continue
         trial[c] = mode
-        k = find_modes(tapes, trial)
+        k = row_of(tapes, trial, work)
         if k < 0:
             return False
         k = index(k)

@@ -18,12 +18,14 @@ from hybridsim.engine.events.compiled.scratch import (
     DISCRETE,
     DISCRETE_AT,
     FIRED,
+    IS_WANTED,
     NOBODY,
     ROW,
     SPREAD,
     LocatedEvent,
     called_by,
     located,
+    row_of,
 )
 from hybridsim.engine.linear.guard_coefficients import has_tables, linear_series, measure_point
 from hybridsim.engine.linear.motion import errors_of_time, functions_of_time
@@ -168,7 +170,7 @@ def resolve_ordinary(
         if back >= 0:
             work.is_zero[back] = True  # a corner is at zero on both sides
         put(z, work.now)
-        work.int_slots[ROW] = find_modes(tapes, z)
+        work.int_slots[ROW] = row_of(tapes, z, work)
     k, found = work.int_slots[ROW], LEAVES
     if k >= 0:
         after = LocatedEvent(at.s, at.s_error, x, x_error, vector, at.z)
@@ -182,7 +184,8 @@ def resolve_ordinary(
 def resolve_event(automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any, work: Any) -> int:
     """Resolve the event in the work space and replace the state; return 1, or 0 for other events.
 
-    If no guard fired, only the series of the active guards are written to the work space. lin: tables of linear modes,
+    If modes without an instruction tape are wanted, nothing is decided: the event counts as one of the others. If no
+    guard fired, only the series of the active guards are written to the work space. lin: tables of linear modes,
     empty for others. state: `hybridsim.engine.events.state.StateArrays`.
     """
     fired = work.int_slots[FIRED]
@@ -192,6 +195,8 @@ def resolve_event(automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any, 
         return 1
     if has_tables(lin) and resolve_clear(automata, tapes, lin, state, work, fired):
         return 1
+    if work.int_slots[IS_WANTED] != 0:
+        return 0
     c = automata.owner[fired]
     for d in range(state.z.shape[0]):
         short_loop()

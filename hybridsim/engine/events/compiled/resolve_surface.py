@@ -14,12 +14,11 @@ from hybridsim.engine.events.choice.joint_choice import (
 )
 from hybridsim.engine.events.choice.verdict import FINE, LEAVES, UNDECIDED, verdict
 from hybridsim.engine.events.compiled.guard_series import guard_series, is_continuous
-from hybridsim.engine.events.compiled.scratch import ROW, called_by, located
+from hybridsim.engine.events.compiled.scratch import ROW, called_by, located, row_of
 from hybridsim.engine.linear.guard_coefficients import measure_point
 from hybridsim.engine.native.kernels import call, call_noinline, inline_always, inlined
 from hybridsim.engine.native.loop_hints import put, short_loop
 from hybridsim.engine.series.bounded import UNIT
-from hybridsim.engine.system.programs.modes_index import find_modes
 
 _MODES = 3  # modes of a surface
 
@@ -84,7 +83,7 @@ def choose_modes(
                 continue
             for i in range(count):
                 trial[members[i]] = candidates[number, i]
-            row = k if is_current(rank, count) else find_modes(tapes, trial)
+            row = k if is_current(rank, count) else row_of(tapes, trial, work)
             if row < 0:
                 return -1
             if not (is_current(rank, count) and is_known):

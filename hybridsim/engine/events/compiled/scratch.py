@@ -8,14 +8,16 @@ import numpy as np
 
 from hybridsim.engine.events.choice.verdict import NO_SIDE
 from hybridsim.engine.native.kernels import ENABLED, inline_always, inlined
+from hybridsim.engine.native.loop_hints import put
 from hybridsim.engine.native.simd.products import vector_of
 from hybridsim.engine.native.struct_pack import packed
 from hybridsim.engine.series.bounded import ORDER
 from hybridsim.engine.system.per_structure import per_structure
+from hybridsim.engine.system.programs.modes_index import find_modes
 
 # Largest number of components at their surfaces at once; more have too many candidates for compiled loops.
 MAX_JOINT_COMPONENTS = 3
-FIRED, DISCRETE, DISCRETE_AT, ROW = range(4)  # indices of `EventScratch.int_slots`
+FIRED, DISCRETE, DISCRETE_AT, ROW, IS_WANTED = range(5)  # indices of `EventScratch.int_slots`
 AT, AT_ERROR, SPREAD = range(3)  # indices of `EventScratch.float_slots`
 RESOLVE, EVENT_LOOP, SERIES, KNOWN_TIME = range(4)  # indices of `EventScratch.entry_points`
 NOBODY = -1  # no guard fired
@@ -50,7 +52,8 @@ class EventScratch(NamedTuple):
 
     functions: np.ndarray  # addresses (5,): `Functions`
     entry_points: np.ndarray  # addresses (4,) of kernels at RESOLVE, EVENT_LOOP, SERIES, KNOWN_TIME
-    int_slots: np.ndarray  # integers at FIRED, DISCRETE, DISCRETE_AT, ROW
+    int_slots: np.ndarray  # integers at FIRED, DISCRETE, DISCRETE_AT, ROW, IS_WANTED
+    wanted: np.ndarray  # modes (C,) that have no instruction tape yet, if IS_WANTED is 1
     # numbers at AT, AT_ERROR, SPREAD (bounds by which simultaneous guards may be from zero)
     float_slots: np.ndarray
     y: np.ndarray  # states (n,) at the event
@@ -104,6 +107,20 @@ def located(state: Any, work: Any) -> LocatedEvent:
     )
 
 
+@inlined
+def row_of(tapes: Any, z: Any, work: Any) -> int:
+    """Return the row of a combination of modes in the instruction tapes.
+
+    If there is none, note that the modes are wanted, and return -1. The caller must then decide nothing: the host adds
+    the tape and calls again.
+    """
+    k = find_modes(tapes, z)
+    if k < 0:
+        work.int_slots[IS_WANTED] = 1
+        put(z, work.wanted)
+    return k
+
+
 def work_space(system: Any, atoms: int = 0, monomials: int = 0) -> EventScratch:
     """Return work arrays for the events of a system; linear modes need additional arrays."""
     guards, count = system.guard_count, len(system.automata)
@@ -122,8 +139,9 @@ def work_space(system: Any, atoms: int = 0, monomials: int = 0) -> EventScratch:
             functions=np.array(functions_of(system), dtype=np.int64 if ENABLED else object),
             entry_points=numbers(4),
             int_slots=np.array(
-                [-1, len(system.model.discrete), system.layout.discrete_at, -1], dtype=np.int64
+                [-1, len(system.model.discrete), system.layout.discrete_at, -1, 0], dtype=np.int64
             ),
+            wanted=numbers(count),
             float_slots=np.zeros(3),
             **{name: vector_of(system.n) for name in ("y", "y_error", "slopes", "x_after")},
             size=np.zeros(1),

@@ -6,6 +6,7 @@ The rules are those of `hybridsim.engine.events.resolve`, which resolves the oth
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -17,11 +18,13 @@ from hybridsim.engine.events.compiled.resolve_surface import choose_modes, clust
 from hybridsim.engine.events.compiled.scratch import (
     AT,
     AT_ERROR,
+    IS_WANTED,
     MAX_JOINT_COMPONENTS,
     SERIES,
     LocatedEvent,
     called_by,
     located,
+    row_of,
     work_space,
 )
 from hybridsim.engine.events.outcome import Outcome
@@ -32,8 +35,7 @@ from hybridsim.engine.native.loop_hints import put
 from hybridsim.engine.native.struct_pack import packed
 from hybridsim.engine.series.bounded import UNIT, run_series
 from hybridsim.engine.system.per_structure import per_structure, spare_scratch
-from hybridsim.engine.system.programs.mode_tables import automata_of, tape_cache_of
-from hybridsim.engine.system.programs.modes_index import find_modes
+from hybridsim.engine.system.programs.mode_tables import Tapes, automata_of, tape_cache_of
 from hybridsim.engine.system.system import System
 
 _UNKNOWN = -1  # mode not determined yet
@@ -61,7 +63,7 @@ def plain_start(
     for c in range(z.shape[0]):
         if z[c] == _UNKNOWN and not _choose_cluster(automata, tapes, inputs, none, state, c, work):
             return False
-    k = find_modes(tapes, z)
+    k = row_of(tapes, z, work)
     if k < 0:
         return False
     at = LocatedEvent(0.0, 0.0, x, x_error, p, z)
@@ -125,7 +127,7 @@ def _choose_cluster(
     put(x_error, work.slopes)
     put(z, work.before)
     put(z, work.now)
-    at, k = located(state, work), find_modes(tapes, trial)
+    at, k = located(state, work), row_of(tapes, trial, work)
     if k < 0:
         return False
     guard_series(tapes, inputs, none, k, at, work.x_after, work.slopes, work)
@@ -161,9 +163,9 @@ def _is_supported(system: System) -> bool:
 
 
 class StartScratch:
-    """The arrays of a call that judges modes without an event; `modes` lists combinations with instruction tapes."""
+    """The arrays of a call that judges modes without an event."""
 
-    def __init__(self, system: System) -> None:
+    def __init__(self, system: System, tapes: Tapes) -> None:
         n, count, guards, whole = system.n, len(system.automata), system.guard_count, np.int64
         none = np.zeros(0, dtype=whole)
         blank = Outcome(
@@ -172,12 +174,9 @@ class StartScratch:
         )  # fmt: skip
         self.state = HybridState.of(blank, blank.p)
         self.as_packed, self.work, self.nothing = self.state.packed(), work_space(system), no_tables()
-        cache = tape_cache_of(system)
-        cache.surround(blank.z)
-        self.modes = cache.tapes.modes
         # the code for short series does not know the roundoff of numbers, as it counts at a start
-        without = {"bounds": np.zeros_like(cache.tapes.bounds), "lacked": np.zeros_like(cache.tapes.lacked)}
-        self.tapes = packed(cache.tapes.arrays._replace(**without))  # type: ignore[attr-defined]  # of a pack
+        without = {"bounds": np.zeros_like(tapes.bounds), "lacked": np.zeros_like(tapes.lacked)}
+        self.tapes = packed(tapes.arrays._replace(**without))  # type: ignore[attr-defined]  # of a pack
         self.inputs, self.values = system.registers.rounded()
         self.filled = b""  # the run-time vector in `values`
         self.automata, self.surfaces = automata_of(system), surfaces_of(system)
@@ -195,6 +194,28 @@ class StartScratch:
         )
 
 
+def judged(system: System, call: Callable[[StartScratch], bool]) -> HybridState | None:
+    """Return the state that a call of a kernel leaves in its arrays, or None if the kernel returns False.
+
+    The call fills the arrays itself. It is made again as long as it wants the instruction tapes of more modes.
+    """
+    spare, cache = spare_scratch(system, "start"), tape_cache_of(system)
+    try:
+        scratch = spare.pop()
+    except IndexError:
+        scratch = StartScratch(system, cache.tapes)
+    while True:
+        slots = scratch.work.int_slots
+        slots[IS_WANTED] = 0
+        is_certain = call(scratch)
+        if not slots[IS_WANTED]:
+            break
+        scratch = StartScratch(system, cache.with_modes(scratch.work.wanted))
+    found = scratch.state.copy() if is_certain else None
+    spare.append(scratch)
+    return found
+
+
 _plain_start = Precompiled(plain_start)
 
 
@@ -202,21 +223,18 @@ def compiled_start(system: System, x0: np.ndarray, x_error: np.ndarray, p: np.nd
     """Return the state just after the start from `x0` with error bounds, or None if the general rules must decide."""
     if not _is_supported(system):
         return None
-    spare = spare_scratch(system, "start")
-    try:
-        scratch = spare.pop()
-    except IndexError:
-        scratch = StartScratch(system)
-    state = scratch.state
-    state.x[:], state.x_error[:], state.p[:] = x0, x_error, p
-    key = p.tobytes()
-    if scratch.filled != key:
-        system.registers.fill(scratch.values, p)
-        scratch.filled = key
-    is_certain = _plain_start(
-        scratch.automata, scratch.tapes, scratch.inputs, scratch.nothing, system.layout.pin_at, scratch.surfaces,
-        scratch.as_packed, scratch.work,
-    )  # fmt: skip
-    found = state.copy() if is_certain else None
-    spare.append(scratch)
-    return found
+
+    def call(scratch: StartScratch) -> bool:
+        state = scratch.state
+        state.x[:], state.x_error[:], state.p[:] = x0, x_error, p
+        key = p.tobytes()
+        if scratch.filled != key:
+            system.registers.fill(scratch.values, p)
+            scratch.filled = key
+        is_certain: bool = _plain_start(
+            scratch.automata, scratch.tapes, scratch.inputs, scratch.nothing, system.layout.pin_at, scratch.surfaces,
+            scratch.as_packed, scratch.work,
+        )  # fmt: skip
+        return is_certain
+
+    return judged(system, call)

@@ -19,10 +19,12 @@ from hybridsim.engine.series.operations import (
 )
 from hybridsim.engine.series.optimise import live_rows
 from hybridsim.engine.system.per_structure import per_structure
-from hybridsim.engine.system.programs.mode_tables import Tapes, in_a_row
+from hybridsim.engine.system.programs.growing_rows import GrowingArray, GrowingLists
+from hybridsim.engine.system.programs.mode_tables import Tapes
 from hybridsim.engine.system.system import System
+from hybridsim.forks import SharedLock
 
-_LINEAR = {ADD, SUB, NEG, ADD_CONSTANT, SUB_CONSTANT, CONSTANT_SUB, SCALE, DIVIDE_BY}
+_LINEAR = (ADD, SUB, NEG, ADD_CONSTANT, SUB_CONSTANT, CONSTANT_SUB, SCALE, DIVIDE_BY)
 
 
 class Parts(NamedTuple):
@@ -38,20 +40,18 @@ class Parts(NamedTuple):
     step_rows: np.ndarray
 
 
-class _ModeParts(NamedTuple):
-    """Rows of an instruction tape for the guards in one combination of modes."""
-
-    guards: np.ndarray
-    is_linear: bool
-    steps: np.ndarray
-
-
 class GuardParts:
     """Caches the instructions for guards, which depend on the model's structure only."""
 
     def __init__(self, system: System) -> None:
         self.system = system
         self._known: tuple[Tapes, Parts] | None = None
+        self._lock, self._count = SharedLock(), 0
+        self._guards, self._steps, self._is_linear = (
+            GrowingLists(),
+            GrowingLists(),
+            GrowingArray((), np.bool_),
+        )
 
     def of(self, tapes: Tapes) -> Parts:
         """Return the instructions for the guards of the given tapes."""
@@ -61,28 +61,26 @@ class GuardParts:
         return known[1]
 
     def _parts(self, tapes: Tapes) -> Parts:
-        found = [_mode_parts(self.system, modes.tobytes()) for modes in tapes.modes]
-        parts: Parts = packed(
-            Parts(
-                *in_a_row([one.guards for one in found]),
-                np.array([one.is_linear for one in found], dtype=np.bool_),
-                *in_a_row([one.steps for one in found]),
-            )
-        )
+        with self._lock:
+            count = len(tapes.modes)
+            for k in range(self._count, count):
+                guards, is_linear, steps = _mode_parts(self.system, tapes.modes[k])
+                self._guards.put(k, guards)
+                self._steps.put(k, steps)
+                self._is_linear.put(k, [is_linear])
+                self._count = k + 1
+            is_linear = self._is_linear.up_to(count)
+            parts: Parts = packed(Parts(*self._guards.up_to(count), is_linear, *self._steps.up_to(count)))
         return parts
 
 
 guard_parts_of = per_structure(GuardParts)
 
 
-@per_structure
-def _mode_parts(system: System, modes: bytes) -> _ModeParts:
-    z = np.frombuffer(modes, dtype=np.int64)
+def _mode_parts(system: System, z: np.ndarray) -> tuple[np.ndarray, bool, np.ndarray]:
+    """Return the rows of one combination of modes for the guards, whether they are linear, and the step rows."""
     tape = system.optimised_tape(z)
-    optimised_rows = [tuple(row) for row in tape.rows.tolist()]
-    guard_registers, rates = set(tape.guards[system.active(z)].tolist()), set(tape.derivatives.tolist())
-    guards = live_rows(optimised_rows, guard_registers)
-    is_linear = all(row[0] in _LINEAR for row in guards)
-    steps = live_rows(optimised_rows, rates | guard_registers if is_linear else rates)
-    guard_rows, step_rows = (np.array(part, dtype=np.int64).reshape(-1, 5) for part in (guards, steps))
-    return _ModeParts(guard_rows, is_linear, step_rows)
+    guard_registers, rates = tape.guards[system.active(z)], tape.derivatives
+    guards = live_rows(tape.rows, guard_registers)
+    is_linear = bool(np.isin(guards[:, 0], _LINEAR).all())
+    return guards, is_linear, live_rows(tape.rows, [*rates, *guard_registers] if is_linear else rates)

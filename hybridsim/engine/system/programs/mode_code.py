@@ -55,17 +55,18 @@ def _holding(system: System, z: np.ndarray) -> Iterator[int]:
     tape = system.code.data["tape"]
     zeros = [register for register, value, _ in tape["constants"] if value == 0.0]
     pins = [register for register, source in tape["parameters"] if source == system.layout.pin_at]
-    for op, a, b, _, out in constant_rows(system, z):
-        if op == LESS and a in zeros and b in pins:
+    rows = system.optimised_tape(z).constant_rows
+    for _, a, b, _, out in rows[rows[:, 0] == LESS].tolist():
+        if a in zeros and b in pins:
             yield out
 
 
 def computed_rates(system: System, z: np.ndarray) -> list[bool]:
     """Return for each state whether an instruction computes its rate; a constant, held or copied rate needs none."""
     tape, sure = system.optimised_tape(z), frozenset(_holding(system, z))
-    rows = _rows(tape.rows)
-    chosen = {out: b for op, a, b, _, out in rows if op == SELECT and a in sure}
-    results = {out + k for op, _, _, _, out in rows for k in range(2 if op in PAIRED else 1)}
+    rows = tape.rows
+    chosen = {out: b for _, a, b, _, out in rows[rows[:, 0] == SELECT].tolist() if a in sure}
+    results = {*rows[:, 4].tolist(), *(rows[np.isin(rows[:, 0], PAIRED), 4] + 1).tolist()}
     found = []
     for register in tape.derivatives.tolist():
         while register in chosen:
@@ -79,7 +80,10 @@ def fading(system: System, z: np.ndarray) -> list[int]:
 
     See `hybridsim.engine.roots.vanishing_terms`.
     """
-    rows = _rows(system.optimised_tape(z).rows)
+    tape = system.optimised_tape(z)
+    if not np.isin(tape.rows[:, 0], list(_KIND)).any():
+        return []
+    rows = _rows(tape.rows)
     found: dict[tuple[int, int], int] = {}
     for op, a, b, _, out in rows:
         if _may_fade(op, b):

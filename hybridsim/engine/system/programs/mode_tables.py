@@ -13,6 +13,7 @@ from hybridsim.engine.native.struct_pack import packed
 from hybridsim.engine.series.emit_bounds import bounds_text, can_bound
 from hybridsim.engine.series.emit_series import ModeTape
 from hybridsim.engine.system.per_structure import per_structure
+from hybridsim.engine.system.programs.growing_rows import GrowingArray, GrowingLists
 from hybridsim.engine.system.programs.mode_code import (
     ModeCompiler,
     computed_rates,
@@ -25,7 +26,7 @@ from hybridsim.engine.system.system import System
 from hybridsim.forks import SharedLock
 from hybridsim.model.parts.component import MonitorCorner
 
-_ALL = 27  # largest number of vectors of modes that are all present from the start, as for three contacts
+FEW = 27  # largest number of few combinations of modes, as for three contacts
 
 
 class Automata(NamedTuple):
@@ -57,8 +58,6 @@ class Tapes(NamedTuple):
     hash_slots: np.ndarray  # hash table: `hybridsim.engine.system.programs.modes_index`
     optimised_start: np.ndarray
     optimised: np.ndarray  # rows of the optimised tapes
-    high_start: np.ndarray
-    high: np.ndarray  # rows for high orders
     constant_start: np.ndarray
     constant: np.ndarray  # rows executed once per segment
     active_start: np.ndarray
@@ -134,20 +133,19 @@ def _flat(lists: Any) -> tuple[np.ndarray, np.ndarray]:
 class TapeCache:
     """The instruction tapes of the modes that occurred so far; new combinations of modes are added.
 
-    If there are few vectors, all are present from the start. The presence of a tape decides how an event is resolved,
-    and so affects the last digits. These digits then do not depend on earlier runs.
+    No decision depends on which tapes exist: a compiled loop that lacks one returns, and goes on when it was added.
     """
 
     def __init__(self, system: System) -> None:
         self.system = system
-        self._counts = [len(automaton.modes) for automaton in system.automata]
-        self._met: dict[bytes, np.ndarray] = {}
-        self._surrounded: set[bytes] = set()
+        self._numbers: dict[bytes, int] = {}  # row of each combination
         self._lock = SharedLock()
         self._compiler = ModeCompiler(system, "bounds", ("bounds",), self._text)
-        self._code = np.zeros((2, 0), dtype=np.int64)
-        self._rows: list[_ModeRows] = []  # rows of the vectors of modes met so far
-        self.tapes = self._stacked()
+        components, guards = len(system.automata), system.guard_count
+        self._modes, self._code = GrowingArray((components,)), (GrowingArray(), GrowingArray())
+        self._lists = GrowingLists(), GrowingLists(), GrowingLists(()), GrowingLists(())
+        self._rows = GrowingArray((system.n,)), GrowingArray((system.n,), np.bool_), GrowingArray((guards,))
+        self.tapes = self._packed(0)
 
     def look(self) -> None:
         """Compile code for modes in which many short series were computed without compiled code."""
@@ -166,94 +164,59 @@ class TapeCache:
         numbers = np.flatnonzero(system.active(z)).tolist()
         return lambda: bounds_text(tape, rows, constant_sources(system), numbers, system.guard_count)
 
-    def surround(self, z: np.ndarray) -> None:
-        """Add the instruction tapes of a combination of modes, and of the modes to which one event may lead."""
-        if z.tobytes() in self._surrounded:
-            return
-        with self._lock:
-            met = len(self._met)
-            if not met and math.prod(self._counts) <= _ALL:
-                for modes in product(*map(range, self._counts)):
-                    self._met[np.array(modes, dtype=np.int64).tobytes()] = np.array(modes, dtype=np.int64)
-            self._met.setdefault(z.tobytes(), z.copy())
-            for c, automaton in enumerate(self.system.automata):
-                for m in range(len(automaton.modes)):
-                    other = z.copy()
-                    other[c] = m
-                    self._met.setdefault(other.tobytes(), other)
-            if len(self._met) > met:
-                self.tapes = self._stacked()
-            self._surrounded.add(z.tobytes())
+    def with_modes(self, z: np.ndarray) -> Tapes:
+        """Return instruction tapes that include those of a combination of modes."""
+        if z.tobytes() not in self._numbers:
+            self.rows_of(z[None])
+        return self.tapes
+
+    def with_few(self) -> Tapes:
+        """Return the tapes so far, with those of all combinations of modes if these are few.
+
+        The tables of linear modes of few combinations are made at once.
+        """
+        counts = [len(automaton.modes) for automaton in self.system.automata]
+        if len(self._numbers) < math.prod(counts) <= FEW:
+            self.rows_of(np.array(list(product(*map(range, counts))), dtype=np.int64))
+        return self.tapes
 
     def rows_of(self, vectors: np.ndarray) -> np.ndarray:
         """Return the rows of some combinations of modes, and add the missing rows."""
         with self._lock:
-            met = len(self._met)
+            numbers, added = self._numbers, dict[bytes, int]()
             for z in vectors:
-                self._met.setdefault(z.tobytes(), z.copy())
-            if len(self._met) > met:
-                self.tapes = self._stacked()
-            numbers = {z: k for k, z in enumerate(self._met)}
-        return np.array([numbers[z.tobytes()] for z in vectors], dtype=np.int64)
+                if (key := z.tobytes()) not in numbers and key not in added:
+                    k = added[key] = len(numbers) + len(added)
+                    self._put(k, z)
+            if added:
+                self.tapes = self._packed(len(numbers) + len(added))
+                numbers.update(added)  # last, because another thread may look for a number without the lock
+            return np.array([numbers[z.tobytes()] for z in vectors], dtype=np.int64)
 
-    def _stacked(self) -> Tapes:
-        system, met = self.system, list(self._met.values())
-        self._rows += [_ModeRows.of(system, z) for z in met[len(self._rows) :]]
-        rows = self._rows
-        modes = np.array(met, dtype=np.int64).reshape(len(met), len(system.automata))
-        code = np.zeros((2, len(met)), dtype=np.int64)
-        code[:, : self._code.shape[1]] = self._code
-        self._code = code
+    def _put(self, k: int, z: np.ndarray) -> None:
+        """Write the rows of a combination of modes to all arrays."""
+        system, tape = self.system, self.system.optimised_tape(z)
+        of_lists = tape.rows, tape.constant_rows, np.flatnonzero(system.active(z)), fading(system, z)
+        for lists, part in zip(self._lists, of_lists, strict=True):
+            lists.put(k, part)
+        of_rows = tape.derivatives, computed_rates(system, z), tape.guards
+        for rows, one in zip(self._rows, of_rows, strict=True):
+            rows.put(k, [one])
+        for code in self._code:
+            code.put(k, [0])
+        self._modes.put(k, [z])
+
+    def _packed(self, count: int) -> Tapes:
+        modes = self._modes.up_to(count)
         tapes: Tapes = packed(
             Tapes(
                 modes,
                 index_of(modes),
-                *in_a_row([one.optimised for one in rows]),
-                *in_a_row([one.high for one in rows]),
-                *in_a_row([one.constant for one in rows]),
-                *in_a_row([one.active for one in rows], columns=()),
-                *in_a_row([np.array(one.fading, dtype=np.int64) for one in rows], columns=()),
-                np.array([one.derivatives for one in rows], dtype=np.int64).reshape(len(met), system.n),
-                np.array([one.computed for one in rows], dtype=np.bool_).reshape(len(met), system.n),
-                np.array([one.guards for one in rows], dtype=np.int64).reshape(len(met), system.guard_count),
-                *code,
+                *(array for lists in self._lists for array in lists.up_to(count)),
+                *(rows.up_to(count) for rows in (*self._rows, *self._code)),
             )
         )
         return tapes
 
 
 tape_cache_of = per_structure(TapeCache)
-
-
-class _ModeRows(NamedTuple):
-    """The rows of `Tapes` for one combination of modes."""
-
-    optimised: np.ndarray
-    high: np.ndarray
-    constant: np.ndarray
-    active: np.ndarray
-    derivatives: np.ndarray
-    computed: list[bool]
-    fading: list[int]
-    guards: np.ndarray
-
-    @classmethod
-    def of(cls, system: System, z: np.ndarray) -> _ModeRows:
-        """Return the rows of a combination of modes; the rows are reused when more combinations are added."""
-        tape = system.optimised_tape(z)
-        return cls(
-            tape.rows,
-            np.array(system.high_rows(z), dtype=np.int64).reshape(-1, 5),
-            tape.constant_rows,
-            np.flatnonzero(system.active(z)),
-            tape.derivatives,
-            computed_rates(system, z),
-            fading(system, z),
-            tape.guards,
-        )
-
-
-def in_a_row(parts: list[np.ndarray], columns: tuple[int, ...] = (5,)) -> tuple[np.ndarray, np.ndarray]:
-    """Return the start of each integer array in a concatenation, and the concatenation."""
-    starts = np.cumsum([0, *(len(part) for part in parts)]).astype(np.int64)
-    return starts, np.concatenate([np.zeros((0, *columns), dtype=np.int64), *parts])
