@@ -86,6 +86,7 @@ class Emitter:
         self.lowering = lowering
         self.printer = _printer()
         self.inputs = self._inputs()
+        self._lines: dict[int, list[str]] = {}  # of the items
 
     def _inputs(self) -> dict[str, str]:
         """Return the place from which each external name of the program is read."""
@@ -107,7 +108,7 @@ class Emitter:
         program, model = self.program, self.program.model
         states = range(len(model.states))
         guards = sorted(
-            {n for i in program.items for n in _names(i) if n.startswith("guard_")}, key=_by_numbers
+            {n for i in program.items for n in i.assigned if n.startswith("guard_")}, key=_by_numbers
         )
         parts = [
             _HEADER.format(name=model.name),
@@ -164,12 +165,15 @@ class Emitter:
         for e in expressions:
             names |= {e} if isinstance(e, str) else {s.name for s in e.free_symbols}
         items = items_for(self.program.items, names)
-        lines: list[str] = []
-        for item in items:
-            lines += self._item(item)
-        return lines
+        return [line for item in items for line in self._item(item)]
 
     def _item(self, item: Item) -> list[str]:
+        """Return the lines of a program item, which several functions contain."""
+        if id(item) not in self._lines:  # the program keeps its items
+            self._lines[id(item)] = self._new_lines(item)
+        return self._lines[id(item)]
+
+    def _new_lines(self, item: Item) -> list[str]:
         if isinstance(item, Assign):
             return [f"    {item.name} = {self._text(item.expression)}"]
         if all(branch == item.branches[0] for branch in item.branches):
@@ -333,11 +337,6 @@ class Emitter:
 
     def _branch(self, builder: TapeBuilder, item: Switch, mode: int) -> tuple[Any, ...]:
         return tuple(builder.rows([(a.name, a.expression) for a in item.branches[mode]], {}))
-
-
-def _names(item: Item) -> set[str]:
-    branches = item.branches if isinstance(item, Switch) else ((item,),)
-    return {a.name for branch in branches for a in branch}
 
 
 def _by_numbers(name: str) -> tuple[int, ...]:

@@ -69,16 +69,15 @@ class HeldStates:
 
         For the rate of a gap, velocities come before positions.
         """
-        sp, fixed = self.lowering.sp, set(self.states)
-        found = []
-        for i, x in enumerate(self.states):
-            slope = sp.diff(self.surfaces[c], x)
+        fixed, found = set(self.states), []
+        for i, slope in self.lowering.gradient(self.surfaces[c]).items():
+            x = self.states[i]
             if slope != 0 and not slope.free_symbols & fixed:
                 found.append((c[1] == 1 and x in self._of_gaps, 0 if abs(slope) == 1 else 1, i))
         return [i for *_, i in sorted(found)]
 
     def _uses(self, c: Held) -> tuple[int, ...]:
-        return tuple(i for i, x in enumerate(self.states) if x in self.surfaces[c].free_symbols)
+        return tuple(self.lowering.gradient(self.surfaces[c]))
 
     def _without_choice(self, choices: dict[Held, list[int]]) -> set[Held]:
         """Return the constraints that need projection: they are nonlinear, or share states with a nonlinear one."""

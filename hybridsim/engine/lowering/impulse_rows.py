@@ -37,8 +37,8 @@ def gap_slopes(lowering: Lowering) -> Rows:
     return [
         (f"out[{k * n + i}]", slope)
         for k, gap in gaps
-        for i, x in enumerate(lowering.states)
-        if (slope := lowering.sp.diff(gap, x)) != 0
+        for i, slope in lowering.gradient(gap).items()
+        if slope != 0
     ]
 
 

@@ -122,8 +122,9 @@ class Lowering(LoweringState):
         for c, s in surfaces.items():
             if not self.components[c].surface.is_unilateral:
                 continue
-            slopes = [(self.sp.diff(s, x), d) for x, d in zip(self.states, der, strict=True)]
-            rate = self._rate_in_time(s) + sum(a * self.inline(d, definitions) for a, d in slopes if a != 0)
+            slopes = self.gradient(s).items()
+            rate = self._rate_in_time(s)
+            rate += sum(a * self.inline(der[i], definitions) for i, a in slopes if a != 0)
             wrong = sorted(map(declared_name, self._foreign(rate)))
             if wrong or rate == 0:
                 fault = f"uses {', '.join(wrong)}, which depends on a mode" if wrong else "is zero"
@@ -181,15 +182,18 @@ class Lowering(LoweringState):
         self.effect = effect
         self.products = products = Products(self, unknown)
         totals: dict[int, Any] = {}
+        acting = self._acting(definitions | blends, all_unknown)
         for c in order:
-            s = surfaces[c]
-            totals[c] = self._rate_in_time(s)
-            for x, d in zip(self.states, der, strict=True):
-                slope = sp.diff(s, x)
+            totals[c] = self._rate_in_time(surfaces[c])
+            for i, slope in self.gradient(surfaces[c]).items():
                 if slope != 0:
-                    totals[c] += slope * self._inline_unknown(d, definitions | blends, all_unknown)
+                    totals[c] += slope * self.inline(der[i], acting)
         for c in order:
-            row = {d: simplified(sp.diff(totals[c], unknown[d])) for d in order}
+            occurring = totals[c].free_symbols
+            row = {
+                d: simplified(sp.diff(totals[c], unknown[d])) if unknown[d] in occurring else sp.Integer(0)
+                for d in order
+            }
             row, rate[c] = products.linear(c, totals, row)
             effect |= {(c, d): slope for d, slope in row.items()}
             self.effects.append(effect[c, c])
@@ -204,7 +208,7 @@ class Lowering(LoweringState):
                 self.never_held.add(c)
         self.partners = partners(self, surfaces, rate, effect)
         self.never_held -= self.partners.keys()
-        self.open_rates = [self._inline_unknown(d, definitions | blends, all_unknown) for d in der]
+        self.open_rates = [self.inline(d, acting) for d in der]
         switching = {c: u for c, u in unknown.items() if self.components[c].surface.unique}
         if switching:
             refuse_powers(self, switching, self.open_rates)
@@ -230,9 +234,9 @@ class Lowering(LoweringState):
                 found |= {self.symbols[n]: self.convert(e) for n, e in hold.set.items()}
         return found
 
-    def _inline_unknown(self, e: Any, definitions: dict[Any, Any], unknown: set[Any]) -> Any:
-        inner = {k: d for k, d in definitions.items() if self.inline(d, definitions).free_symbols & unknown}
-        return self.inline(e, inner)
+    def _acting(self, definitions: dict[Any, Any], unknown: set[Any]) -> dict[Any, Any]:
+        """Return the definitions that depend on unknown forces."""
+        return {k: d for k, d in definitions.items() if self.inline(d, definitions).free_symbols & unknown}
 
     def _solve(
         self,

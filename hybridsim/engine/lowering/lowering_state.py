@@ -33,6 +33,9 @@ class LoweringState:
         self.t = self.symbols["t"]
         self.parameters = {self.symbols[p.name] for p in model.parameters}
         self.states = [self.symbols[s.name] for s in model.states]
+        self._number = {x: i for i, x in enumerate(self.states)}
+        self._read: dict[Any, set[Any]] = {}  # free symbols of definitions
+        self._gradients: dict[Any, dict[int, Any]] = {}
         self.rates: list[Any] = []
         self.unknown: dict[int, Any] = {}  # unknown of each surface
         self.definitions: dict[Any, Any] = {}
@@ -103,9 +106,24 @@ class LoweringState:
 
     def inline(self, e: Any, definitions: dict[Any, Any]) -> Any:
         """Substitute definitions in an expression, repeatedly, until none is left."""
-        while e.free_symbols & definitions.keys():
-            e = e.subs(definitions)
+        while occurring := e.free_symbols & definitions.keys():
+            waiting = list(occurring)
+            while waiting:  # those that occur in definitions
+                definition = definitions[waiting.pop()]
+                if definition not in self._read:
+                    self._read[definition] = definition.free_symbols
+                more = (self._read[definition] & definitions.keys()) - occurring
+                occurring |= more
+                waiting += more
+            e = e.subs({name: definitions[name] for name in occurring})
         return e
+
+    def gradient(self, e: Any) -> dict[int, Any]:
+        """Return the derivatives of an expression by the states that occur in it, by their numbers, in order."""
+        if e not in self._gradients:
+            numbers = sorted(self._number[x] for x in e.free_symbols & self._number.keys())
+            self._gradients[e] = {i: self.sp.diff(e, self.states[i]) for i in numbers}
+        return self._gradients[e]
 
     def title(self, c: int, plural: bool = False) -> str:
         """Return the term for the function of a surface in messages, such as 'gap' or 'relative velocity'."""

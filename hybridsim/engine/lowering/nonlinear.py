@@ -15,7 +15,7 @@ def refuse_powers(lowering: LoweringState, unknown: dict[int, Any], rates: list[
     for c, u in unknown.items():
         for x, rate in zip(lowering.states, rates, strict=True):
             component = lowering.components[c]
-            if u in simplified(lowering.sp.diff(rate, u)).free_symbols:
+            if u in rate.free_symbols and u in simplified(lowering.sp.diff(rate, u)).free_symbols:
                 name = declared_name(u)
                 raise ModelError(
                     f"surface {component.name}: {name} enters the rate of {declared_name(x)} nonlinearly",

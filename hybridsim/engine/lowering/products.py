@@ -48,8 +48,10 @@ class Products:
             d: self.lowering.sp.Integer(0) if d in known else slope.subs(values_by_mode)
             for d, slope in row.items()
         }
-        zero = {u: 0 for d, u in self.unknown.items() if d not in known}
-        rest = totals[c].subs(values_by_mode).subs(zero)
+        rest = totals[c].subs(values_by_mode)
+        rest = rest.subs(
+            {u: 0 for u in rest.free_symbols & self.number.keys() if self.number[u] not in known}
+        )
         return effects, rest - sum(value * effects[self.number[u]] for u, value in values_by_mode.items())
 
     def items(self) -> list[Item]:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import compress
 from typing import Any
 
 from hybridsim.engine.lowering.program_names import shown, user
@@ -17,6 +20,16 @@ class Assign:
     name: str
     expression: Any
 
+    @cached_property
+    def assigned(self) -> frozenset[str]:
+        """Return the name that the item sets."""
+        return frozenset((self.name,))
+
+    @cached_property
+    def used(self) -> frozenset[str]:
+        """Return the names that the item reads."""
+        return frozenset(s.name for s in self.expression.free_symbols)
+
 
 @dataclass(frozen=True)
 class Switch:
@@ -24,6 +37,22 @@ class Switch:
 
     component: int
     branches: tuple[tuple[Assign, ...], ...]
+
+    @cached_property
+    def assigned(self) -> frozenset[str]:
+        """Return the names that the item sets."""
+        return frozenset(a.name for branch in self.branches for a in branch)
+
+    @cached_property
+    def used(self) -> frozenset[str]:
+        """Return the names that the item reads in any mode and does not set itself."""
+        names: set[str] = set()
+        for branch in self.branches:
+            own: set[str] = set()
+            for a in branch:
+                names |= a.used - own
+                own.add(a.name)
+        return frozenset(names)
 
 
 Item = Assign | Switch
@@ -37,46 +66,22 @@ def changed(item: Item, change: Callable[[Any], Any]) -> Item:
     return Switch(item.component, tuple(branches))
 
 
-def assigned(item: Item) -> set[str]:
-    """Return the names that a program item sets."""
-    if isinstance(item, Assign):
-        return {item.name}
-    return {a.name for branch in item.branches for a in branch}
-
-
-def used(item: Item) -> set[str]:
-    """Return the names that a program item reads in any mode and does not set itself."""
-    if isinstance(item, Assign):
-        return {s.name for s in item.expression.free_symbols}
-    names: set[str] = set()
-    for branch in item.branches:
-        own: set[str] = set()
-        for a in branch:
-            names |= {s.name for s in a.expression.free_symbols} - own
-            own.add(a.name)
-    return names
-
-
 def ordered(items: Iterable[Item]) -> list[Item]:
     """Sort program items so that each name is set before it is read; raise an error for a cycle."""
     waiting = list(items)
-    pending: dict[str, int] = {}
-    for item in waiting:
-        for name in assigned(item):
-            pending[name] = pending.get(name, 0) + 1
+    pending = Counter(name for item in waiting for name in item.assigned)
     result: list[Item] = []
     while waiting:
-        independent = [i for i in waiting if not any(pending.get(n, 0) for n in used(i))]
-        if not independent:
-            loop = sorted({shown(n) for i in waiting for n in assigned(i)})
+        is_independent = [not any(pending[n] for n in item.used) for item in waiting]
+        if not any(is_independent):
+            loop = sorted({shown(n) for i in waiting for n in i.assigned})
             raise ModelError(
                 f"the quantities {', '.join(loop)} depend on each other in a circle",
                 remedy="remove one of these dependencies, or declare one of the quantities as a state",
             )
-        for item in independent:
-            waiting.remove(item)
-            for name in assigned(item):
-                pending[name] -= 1
+        independent = list(compress(waiting, is_independent))
+        waiting = [item for item, is_next in zip(waiting, is_independent, strict=True) if not is_next]
+        pending.subtract(name for item in independent for name in item.assigned)
         result += independent
     return result
 
@@ -86,9 +91,9 @@ def items_for(items: list[Item], names: Iterable[str]) -> list[Item]:
     open_names = set(names)
     selected: list[Item] = []
     for item in reversed(items):
-        if assigned(item) & open_names:
+        if not open_names.isdisjoint(item.assigned):
             selected.append(item)
-            open_names |= used(item)
+            open_names |= item.used
     return selected[::-1]
 
 
@@ -96,7 +101,7 @@ def fixed_names(program: Any) -> set[str]:
     """Return the names of parameters, and of definitions that depend only on parameters."""
     found = {user(q.name) for q in program.model.parameters}
     for item in program.items:
-        if isinstance(item, Assign) and {s.name for s in item.expression.free_symbols} <= found:
+        if isinstance(item, Assign) and item.used <= found:
             found.add(item.name)
     return found
 
@@ -106,5 +111,5 @@ def parameters_read(program: Any, expressions: Iterable[Any]) -> tuple[int, ...]
     names = {s.name for e in expressions for s in e.free_symbols}
     if not names <= fixed_names(program):
         return None
-    read = names.union(*(used(item) for item in items_for(program.items, names)))
+    read = names.union(*(item.used for item in items_for(program.items, names)))
     return tuple(i for i, q in enumerate(program.model.parameters) if user(q.name) in read)

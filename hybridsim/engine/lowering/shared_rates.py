@@ -30,7 +30,7 @@ def shared_rates(
         if not (is_pinned and lowering.components[c].surface.unique) or c in lowering.partners:
             continue
         s = held.surfaces[c, 0]
-        slopes = {k: sp.diff(s, y) for k, y in enumerate(lowering.states) if y in s.free_symbols}
+        slopes = lowering.gradient(s)
         moved = [k for k in slopes if unknown in lowering.open_rates[k].free_symbols]
         if moved == [i] and not slopes[i].free_symbols & set(lowering.states):
             rest = sp.diff(s, lowering.s) + sp.diff(s, lowering.t)
@@ -40,14 +40,18 @@ def shared_rates(
 
 def refuse_changed_rates(lowering: LoweringState, surfaces: dict[int, Any]) -> None:
     """Reject modes that change a rate in ds/dt, because holding forces use the declared rate."""
+    changing: dict[str, Any] = {}  # name of a state -> first component that changes its rate
+    for component in lowering.components:
+        for mode in component.modes:
+            changing = dict.fromkeys(mode.der, component) | changing
     for c, s in surfaces.items():
-        for x, state in zip(lowering.states, lowering.model.states, strict=True):
-            changing = [d for d in lowering.components if any(state.name in m.der for m in d.modes)]
-            if changing and x in s.free_symbols:
+        for i in lowering.gradient(s):
+            state = lowering.model.states[i]
+            if state.name in changing:
                 raise ModelError(
-                    f"modes of {changing[0].name} change the derivative of {state.name}, on which the rate of the "
+                    f"modes of {changing[state.name].name} change the derivative of {state.name}, on which the rate of the "
                     f"{lowering.title(c)} '{lowering.written(c)}' of {lowering.components[c].name} depends",
-                    place=changing[0].place,
+                    place=changing[state.name].place,
                     remedy=f'set a variable in the modes, set = {{ w = "..." }}, and use it in the derivative of '
                     f"{state.name}",
                 )

@@ -36,9 +36,12 @@ def stop_couplings(
             surface = lowering.components[c].surface
             if c == p or surface.is_unilateral or surface.unique:
                 continue
-            slopes = [(sp.diff(rate, x), sp.diff(velocity, x)) for x in lowering.states]
-            factors = {simplified(a / b) for a, b in slopes if b != 0}
-            if len(factors) != 1 or any(a != 0 for a, b in slopes if b == 0):
+            of_rate = {i: slope for i, slope in lowering.gradient(rate).items() if slope != 0}
+            of_velocity = {i: slope for i, slope in lowering.gradient(velocity).items() if slope != 0}
+            if not of_rate.keys() <= of_velocity.keys():
+                continue
+            factors = {simplified(of_rate.get(i, sp.Integer(0)) / b) for i, b in of_velocity.items()}
+            if len(factors) != 1:
                 continue
             (factor,) = factors
             if factor.is_Number and factor != 0:
