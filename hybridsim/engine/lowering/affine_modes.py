@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from sympy import Symbol
+
 from hybridsim.engine.lowering.lowering_state import LoweringState
 
 
@@ -16,9 +18,17 @@ def affine_modes(
     }
     free |= {lowering.symbols[c.surface.unknown] for c in lowering.components if c.surface}
 
+    known: dict[Any, bool] = {}  # by the expression with numbered names, which copies of a part share
+
     def affine(e: Any) -> bool:
-        inner = sorted(e.free_symbols & free, key=str)
-        return all(not lowering.sp.diff(e, a).free_symbols & free for a in inner)
+        names = sorted(e.free_symbols, key=str)
+        moving, fixed = [s for s in names if s in free], [s for s in names if s not in free]
+        numbered = {s: _numbered("moving", i) for i, s in enumerate(moving)}
+        pattern = e.xreplace(numbered | {s: _numbered("fixed", i) for i, s in enumerate(fixed)})
+        if pattern not in known:
+            inner = set(numbered.values())
+            known[pattern] = all(not lowering.sp.diff(pattern, a).free_symbols & inner for a in inner)
+        return known[pattern]
 
     def linear(c: int, m: Any) -> bool:
         surface = lowering.components[c].surface
@@ -34,3 +44,8 @@ def affine_modes(
         component.name: tuple(base and linear(c, m) for m in component.modes)
         for c, component in enumerate(lowering.components)
     } | {"": (base,)}
+
+
+def _numbered(kind: str, i: int) -> Any:
+    """Return the symbol in place of a name."""
+    return Symbol(f"{kind}_{i}", real=True)
