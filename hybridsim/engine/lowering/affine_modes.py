@@ -26,8 +26,8 @@ def affine_modes(
         numbered = {s: _numbered("moving", i) for i, s in enumerate(moving)}
         pattern = e.xreplace(numbered | {s: _numbered("fixed", i) for i, s in enumerate(fixed)})
         if pattern not in known:
-            inner = set(numbered.values())
-            known[pattern] = all(not lowering.sp.diff(pattern, a).free_symbols & inner for a in inner)
+            inner = dict.fromkeys(numbered.values())
+            known[pattern] = all(not lowering.sp.diff(pattern, a).free_symbols & inner.keys() for a in inner)
         return known[pattern]
 
     def linear(c: int, m: Any) -> bool:

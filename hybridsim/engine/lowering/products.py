@@ -44,10 +44,8 @@ class Products:
         free = set().union(*slopes.values()) - {self.unknown[d] for d in known}
         self.pairs |= {(d, self.number[u]) for d, factors in slopes.items() for u in factors & free}
         values_by_mode = {u: self._value_by_mode(self.number[u]) for u in free}
-        effects = {
-            d: self.lowering.sp.Integer(0) if d in known else slope.subs(values_by_mode)
-            for d, slope in row.items()
-        }
+        effects = {d: s.subs(values_by_mode) if s.free_symbols & free else s for d, s in row.items()}
+        effects |= dict.fromkeys(known, self.lowering.sp.Integer(0))
         rest = totals[c].subs(values_by_mode)
         rest = rest.subs(
             {u: 0 for u in rest.free_symbols & self.number.keys() if self.number[u] not in known}
