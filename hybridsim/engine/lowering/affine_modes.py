@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from sympy import Symbol
-
 from hybridsim.engine.lowering.lowering_state import LoweringState
+from hybridsim.engine.lowering.patterns import pattern_of
 
 
 def affine_modes(
@@ -18,16 +17,14 @@ def affine_modes(
     }
     free |= {lowering.symbols[c.surface.unknown] for c in lowering.components if c.surface}
 
-    known: dict[Any, bool] = {}  # by the expression with numbered names, which copies of a part share
+    known: dict[Any, bool] = {}  # by pattern
 
     def affine(e: Any) -> bool:
-        names = sorted(e.free_symbols, key=str)
-        moving, fixed = [s for s in names if s in free], [s for s in names if s not in free]
-        numbered = {s: _numbered("moving", i) for i, s in enumerate(moving)}
-        pattern = e.xreplace(numbered | {s: _numbered("fixed", i) for i, s in enumerate(fixed)})
+        pattern, numbered = pattern_of(e, free)
         if pattern not in known:
-            inner = dict.fromkeys(numbered.values())
-            known[pattern] = all(not lowering.sp.diff(pattern, a).free_symbols & inner.keys() for a in inner)
+            inner = {place for s, place in numbered.items() if s in free}
+            slopes = (lowering.sp.diff(pattern, a) for a in sorted(inner, key=str))
+            known[pattern] = all(not slope.free_symbols & inner for slope in slopes)
         return known[pattern]
 
     def linear(c: int, m: Any) -> bool:
@@ -44,8 +41,3 @@ def affine_modes(
         component.name: tuple(base and linear(c, m) for m in component.modes)
         for c, component in enumerate(lowering.components)
     } | {"": (base,)}
-
-
-def _numbered(kind: str, i: int) -> Any:
-    """Return the symbol in place of a name."""
-    return Symbol(f"{kind}_{i}", real=True)

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from pprint import pformat
 from typing import Any
 
-from sympy import Rational, Symbol
+from sympy import Symbol
 
 from hybridsim.engine.lowering.impulse_rows import gap_slopes, impulses, restitutions, speed_name
 from hybridsim.engine.lowering.lower import Lowering, Program
+from hybridsim.engine.lowering.patterns import pattern_of
+from hybridsim.engine.lowering.printer import Printer
 from hybridsim.engine.lowering.program import Assign, Item, Switch, fixed_names, items_for, parameters_read
 from hybridsim.engine.lowering.program_names import user
 from hybridsim.engine.lowering.reset_keys import amounts_of, is_added, resets_of
@@ -19,7 +20,7 @@ from hybridsim.engine.lowering.stop_coupling import reported_forces
 from hybridsim.engine.series.layout import SIGNAL_SLOTS
 from hybridsim.engine.series.tape import TapeBuilder
 from hybridsim.expr import parse
-from hybridsim.expr.symbolic import PythonPrinter, derivative
+from hybridsim.expr.symbolic import derivative
 from hybridsim.model.smoothing.jumps import SIGN
 from hybridsim.model.smoothing.rewriting import VARIABLE
 
@@ -31,62 +32,16 @@ from math import (acos, asin, atan, atan2, copysign, cos, cosh, exp, inf, log, n
 '''
 
 
-def _printer() -> Any:
-    class Printer(PythonPrinter):
-        """Prints SymPy expressions as plain Python, with all digits, and with powers that stay real."""
-
-        def _print_Integer(self, e: Any) -> str:
-            return f"{e.p}.0"
-
-        def _print_Rational(self, e: Any) -> str:
-            return f"({e.p}.0/{e.q}.0)"
-
-        def _print_Pow(self, e: Any, rational: bool = False) -> str:
-            base = self.parenthesize(e.base, 100)
-            if e.exp.is_Integer and abs(int(e.exp)) <= 64:
-                n = int(e.exp)
-                return f"{base}**{n}" if n > 0 else f"1.0/{base}**{-n}" if n < -1 else f"1.0/{base}"
-            if e.exp in (Rational(1, 2), 0.5):
-                return f"sqrt({self._print(e.base)})"
-            return f"pow({self._print(e.base)}, {self._print(e.exp)})"
-
-        def _print_Exp1(self, e: Any) -> str:
-            return repr(math.e)
-
-        def _print_sign(self, e: Any) -> str:
-            a = self._print(e.args[0])
-            return f"(0.0 if ({a}) == 0.0 else copysign(1.0, {a}))"
-
-        def _print_Min(self, e: Any) -> str:
-            return self._fold("min", e)
-
-        def _print_Max(self, e: Any) -> str:
-            return self._fold("max", e)
-
-        def _fold(self, name: str, e: Any) -> str:
-            text = self._print(e.args[0])
-            for a in e.args[1:]:
-                text = f"{name}({text}, {self._print(a)})"
-            return text
-
-        def _print_Piecewise(self, e: Any) -> str:
-            text = self._print(e.args[-1].expr)
-            for pair in reversed(e.args[:-1]):
-                text = f"(({self._print(pair.expr)}) if {self._print(pair.cond)} else ({text}))"
-            return text
-
-    return Printer()
-
-
 class Emitter:
     """Writes the generated module of one program as text."""
 
     def __init__(self, program: Program, lowering: Lowering) -> None:
         self.program = program
         self.lowering = lowering
-        self.printer = _printer()
+        self.printer = Printer()
         self.inputs = self._inputs()
         self._lines: dict[int, list[str]] = {}  # of the items
+        self._slopes: dict[tuple[Any, Any], Any] = {}  # by pattern and numbered name
 
     def _inputs(self) -> dict[str, str]:
         """Return the place from which each external name of the program is read."""
@@ -234,13 +189,21 @@ class Emitter:
         for assign in branch:
             terms = []
             for symbol in sorted((s for s in assign.expression.free_symbols if s.name in moving), key=str):
-                slope = derivative(assign.expression, symbol)
+                slope = self._slope(assign.expression, symbol)
                 if slope != 0:
                     terms.append(f"({self._text(slope)})*{moving[symbol.name]}")
             found[assign.name] = " + ".join(terms)
             if terms:
                 moving[assign.name] = f"d_{assign.name}"
         return found
+
+    def _slope(self, e: Any, symbol: Any) -> Any:
+        """Return the derivative of an expression, which copies of a part share."""
+        pattern, numbered = pattern_of(e)
+        key = pattern, numbered[symbol]
+        if key not in self._slopes:
+            self._slopes[key] = derivative(*key)
+        return self._slopes[key].xreplace({place: s for s, place in numbered.items()})
 
     def _choose(self) -> str:
         """Return the text of the function that chooses the branch of a guard."""
