@@ -15,7 +15,7 @@ import numpy as np
 
 from hybridsim.engine.events.compiled.at_end import may_vanish
 from hybridsim.engine.events.compiled.known_time import SEGMENTS, STEPS
-from hybridsim.engine.events.compiled.scratch import IS_WANTED, called_by
+from hybridsim.engine.events.compiled.scratch import called_by, note_or_restore
 from hybridsim.engine.native.kernels import call as call_function
 from hybridsim.engine.native.kernels import call_noinline, call_series, inlined, kernel
 from hybridsim.engine.native.loop_hints import put
@@ -44,7 +44,7 @@ from hybridsim.engine.system.tolerances import Tolerances
 
 TERMS = 3  # Taylor coefficients of guards at the end of a step: value, slope and bend
 CONTINUES = -1  # a segment takes another step
-TRIED, REJECTED, TAKEN, FORMER = range(4)  # indices of `PolynomialArrays.counts`
+TRIED, REJECTED, TAKEN = range(3)  # indices of `PolynomialArrays.counts`
 RTOL, MAX_STEP = range(2)  # indices of `PolynomialArrays.control`
 
 
@@ -56,9 +56,7 @@ class PolynomialArrays(NamedTuple):
     codes: Any  # `hybridsim.engine.system.programs.code_cache.EndsCodes` of the tapes
     control: np.ndarray  # rtol, longest step
     atol: np.ndarray  # (n,)
-    counts: (
-        np.ndarray
-    )  # evaluated rates and rejected steps, steps of the segment, and the first two at its start
+    counts: np.ndarray  # evaluated rates, rejected steps and steps of the segment, and all three at its start
     polynomial: np.ndarray  # (n, degree + 1), states in powers of the time since the start of the step
     guards: np.ndarray  # (G, TERMS), Taylor coefficients of the active guards along the flow
     x: np.ndarray  # (n, TERMS), the same of the states
@@ -112,7 +110,7 @@ class PolynomialKernels(MethodKernels):
                 codes=self.codes.of(tapes),
                 control=np.empty(2),
                 atol=np.empty(n),
-                counts=np.zeros(5, dtype=whole),
+                counts=np.zeros(6, dtype=whole),
                 polynomial=np.empty((n, self.degree + 1)),
                 guards=np.empty((guards, TERMS)),
                 x=np.empty((n, TERMS)),
@@ -189,10 +187,8 @@ def begin_segment(start: Any, model: Any, call: Any, state: Any, work: Any, own:
     put(state.x, work.y)
     for i in range(state.x.shape[0]):
         call.scale[i] = abs(state.x[i])
-    counts = own.counts
-    if start.is_rejected and work.int_slots[IS_WANTED] != 0:
-        counts[TRIED], counts[REJECTED] = counts[FORMER + TRIED], counts[FORMER + REJECTED]
-    counts[FORMER + TRIED], counts[FORMER + REJECTED], counts[TAKEN] = counts[TRIED], counts[REJECTED], 0
+    note_or_restore(own.counts, start.is_rejected, work)
+    own.counts[TAKEN] = 0
     return not start.is_rejected
 
 

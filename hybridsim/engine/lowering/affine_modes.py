@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from hybridsim.engine.lowering.lowering_state import LoweringState
-from hybridsim.engine.lowering.patterns import pattern_of
+from hybridsim.engine.lowering.lowering_state import LoweringState, pattern_of
 
 
 def affine_modes(

@@ -10,8 +10,7 @@ from sympy import Symbol
 
 from hybridsim.engine.lowering.impulse_rows import gap_slopes, impulses, restitutions, speed_name
 from hybridsim.engine.lowering.lower import Lowering, Program
-from hybridsim.engine.lowering.patterns import pattern_of
-from hybridsim.engine.lowering.printer import Printer
+from hybridsim.engine.lowering.lowering_state import pattern_of
 from hybridsim.engine.lowering.program import Assign, Item, Switch, fixed_names, items_for, parameters_read
 from hybridsim.engine.lowering.program_names import user
 from hybridsim.engine.lowering.reset_keys import amounts_of, is_added, resets_of
@@ -20,7 +19,7 @@ from hybridsim.engine.lowering.stop_coupling import reported_forces
 from hybridsim.engine.series.layout import SIGNAL_SLOTS
 from hybridsim.engine.series.tape import TapeBuilder
 from hybridsim.expr import parse
-from hybridsim.expr.symbolic import derivative
+from hybridsim.expr.symbolic import ModulePrinter, derivative
 from hybridsim.model.smoothing.jumps import SIGN
 from hybridsim.model.smoothing.rewriting import VARIABLE
 
@@ -38,7 +37,7 @@ class Emitter:
     def __init__(self, program: Program, lowering: Lowering) -> None:
         self.program = program
         self.lowering = lowering
-        self.printer = Printer()
+        self.printer = ModulePrinter()
         self.inputs = self._inputs()
         self._lines: dict[int, list[str]] = {}  # of the items
         self._slopes: dict[tuple[Any, Any], Any] = {}  # by pattern and numbered name

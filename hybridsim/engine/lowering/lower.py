@@ -123,8 +123,7 @@ class Lowering(LoweringState):
             if not self.components[c].surface.is_unilateral:
                 continue
             slopes = self.gradient(s).items()
-            rate = self._rate_in_time(s)
-            rate += sum(a * self.inline(der[i], definitions) for i, a in slopes if a != 0)
+            rate = self._rate_in_time(s) + sum(a * self.inline(der[i], definitions) for i, a in slopes)
             wrong = sorted(map(declared_name, self._foreign(rate)))
             if wrong or rate == 0:
                 fault = f"uses {', '.join(wrong)}, which depends on a mode" if wrong else "is zero"
@@ -186,14 +185,10 @@ class Lowering(LoweringState):
         for c in order:
             totals[c] = self._rate_in_time(surfaces[c])
             for i, slope in self.gradient(surfaces[c]).items():
-                if slope != 0:
-                    totals[c] += slope * self.inline(der[i], acting)
+                totals[c] += slope * self.inline(der[i], acting)
         for c in order:
-            occurring = totals[c].free_symbols
-            row = {
-                d: simplified(sp.diff(totals[c], unknown[d])) if unknown[d] in occurring else sp.Integer(0)
-                for d in order
-            }
+            acts, row = totals[c].free_symbols, dict.fromkeys(order, sp.Integer(0))
+            row |= {d: simplified(sp.diff(totals[c], u)) for d, u in unknown.items() if u in acts}
             row, rate[c] = products.linear(c, totals, row)
             effect |= {(c, d): slope for d, slope in row.items()}
             self.effects.append(effect[c, c])

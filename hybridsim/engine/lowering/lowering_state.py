@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Container
 from typing import Any
 
 import sympy as sp
@@ -160,3 +161,16 @@ class LoweringState:
                     value = self.inline(value, self.definitions).subs(without)
             rows.append((Assign(name, value),))
         return Switch(c, tuple(rows))
+
+
+def pattern_of(e: Any, moving: Container[Any] = ()) -> tuple[Any, dict[Any, Any]]:
+    """Return an expression with numbered names, and the numbered name of each symbol.
+
+    Copies of a part have the same pattern, and so share symbolic results. The numbers are in the order of the names, on which the order of terms depends. moving : symbols that get another
+    kind of name.
+    """
+    numbered = {
+        s: sp.Symbol(f"{'moving' if s in moving else 'fixed'}_{i:04d}", real=True)
+        for i, s in enumerate(sorted(e.free_symbols, key=str))
+    }
+    return e.xreplace(numbered), numbered

@@ -8,7 +8,6 @@ segment.
 
 from __future__ import annotations
 
-import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,13 +24,14 @@ from hybridsim.engine.events.compiled.after_segment import (
     state_errors,
 )
 from hybridsim.engine.events.compiled.known_time import (
-    GOES_ON,
     KNOWN,
     ORIGIN_AT,
     PHASES_AT,
     SEGMENTS,
     SIGNALS_AT,
+    SINCE,
     STEPS,
+    begin_call,
     resolve_known_time,
     set_inputs,
     set_origin,
@@ -58,7 +58,6 @@ FOLLOWED = 3  # returned by a segment kernel that has followed a segment
 # An event this close before a known time or the target may belong to that time: relative to the segment, to the time.
 _NEAR_KNOWN, _NEAR_IN_TIME = 2.0**-20, 2.0**-40
 NO_GUARD = -1  # the end of a segment without an event
-SINCE = 3  # index of `LoopCall.pace`
 
 
 class LoopModel(NamedTuple):
@@ -168,10 +167,7 @@ def event_loop(
     x, x_error, z, p = state.x, state.x_error, state.z, state.p
     y, jumps, place = work.y, record.jumps, (ints[ORIGIN_AT], ints[PHASES_AT])
     before, after, known = jumps.shape[1] - 2, jumps.shape[1] - 1, call.known
-    if ints[GOES_ON] == 0:
-        pace[0], pace[1], pace[2], pace[SINCE] = math.inf, math.inf, 0.0, 0.0
-        ints[STEPS] = ints[SEGMENTS] = ints[KNOWN] = 0
-    ints[GOES_ON] = work.int_slots[IS_WANTED] = 0
+    begin_call(ints, pace, work)
     step, i, since = ints[STEPS], ints[SEGMENTS], pace[SINCE]
     is_ahead, is_rejected, k = False, False, find_modes(tapes, z)
     while True:

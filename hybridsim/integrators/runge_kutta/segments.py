@@ -12,7 +12,7 @@ from typing import Any
 from hybridsim.engine.events.compiled.after_segment import fill_guard_series, state_errors
 from hybridsim.engine.events.compiled.at_end import may_vanish
 from hybridsim.engine.events.compiled.known_time import SEGMENTS, STEPS
-from hybridsim.engine.events.compiled.scratch import IS_WANTED, called_by
+from hybridsim.engine.events.compiled.scratch import called_by, note_or_restore
 from hybridsim.engine.native.kernels import call, call_noinline, call_series, inlined, kernel
 from hybridsim.engine.native.loop_hints import put
 from hybridsim.engine.native.time_grid import on_the_grid
@@ -33,6 +33,7 @@ from hybridsim.engine.run.event_loop import (
 )
 from hybridsim.engine.series.bounded import UNIT
 from hybridsim.engine.series.interpreter import advance, expand
+from hybridsim.integrators.polynomial_steps import put_sides
 from hybridsim.integrators.runge_kutta.step import attempt
 from hybridsim.integrators.step_control import LAST_STEP_FACTOR, SAFETY, SMALLEST, forget, next_length
 
@@ -249,14 +250,12 @@ def runge_kutta_segment(
     """
     k, bound, _, is_rejected = start
     n_steps = first_step = loop.int_slots[STEPS]
-    counts, first = own.counts, own.first_step
+    note_or_restore(own.counts, is_rejected, work)
+    note_or_restore(own.first_step, is_rejected, work)
     if is_rejected:
-        if work.int_slots[IS_WANTED] != 0:
-            counts[0], counts[1], first[0] = counts[2], counts[3], first[1]
         return not_followed(STOPPED)
-    counts[2], counts[3], first[1] = counts[0], counts[1], first[0]
     automata, tapes, inputs, functions = model.automata, model.tapes, model.inputs, called_by(work)
-    settings, parts, codes = own.settings, own.parts, own.codes
+    settings, parts, codes, first = own.settings, own.parts, own.codes, own.first_step
     tableau, hermite, atol = settings.tableau, settings.hermite, settings.atol
     orders, sizes = settings.leading_orders, settings.leading
     leading = (orders[0], sizes[0], sizes[1], orders[1], sizes[2])
@@ -265,7 +264,6 @@ def runge_kutta_segment(
     x, z, p, longest = state.x, state.z, state.p, loop.longest[0]
     W, left, right = own.W, own.left, own.right
     scale, slopes, y, y1 = loop.scale, work.slopes, work.y, work.x_after
-    side_now, order_now, floor_now = own.sides, own.orders, own.floors
     steps, series, n, terms, tolerances = rows.steps, rows.series, x.shape[0], left.shape[1], (rtol, atol)
     guard_rows = parts.rows[parts.start[k] : parts.start[k + 1]]
     step_rows = parts.step_rows[parts.step_start[k] : parts.step_start[k + 1]]
@@ -279,9 +277,7 @@ def runge_kutta_segment(
     for i in range(guard_registers.shape[0]):
         own.numbers[i] = tapes.active[tapes.active_start[k] + i]
         guard_registers[i] = tapes.guards[k, own.numbers[i]]
-    put(state.sides, side_now)
-    put(state.orders, order_now)
-    put(state.floors, floor_now)
+    put_sides(state, own)
     s, fired, is_sure, value, slope, bend, d = 0.0, -1, True, 0.0, 0.0, 0.0, 0.0
     is_holding, is_projected = any_holding(automata, z), any_projecting(automata, z)
     forget(own.memory)
@@ -367,9 +363,7 @@ def runge_kutta_segment(
                 own.counts[1] += 1
                 h = _HALF * at
                 if s == 0.0:
-                    put(state.sides, side_now)
-                    put(state.orders, order_now)
-                    put(state.floors, floor_now)
+                    put_sides(state, own)
                 continue
             ahead = own.guards_right[place]
             value, slope, bend = ahead[0], ahead[1], ahead[2]

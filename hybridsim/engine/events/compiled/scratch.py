@@ -121,6 +121,21 @@ def row_of(tapes: Any, z: Any, work: Any) -> int:
     return k
 
 
+@inlined
+def note_or_restore(counts: Any, is_rejected: bool, work: Any) -> None:
+    """Note the first half of an array in its second half at the start of a segment.
+
+    Restore it if the segment is rejected because its event needs modes without an instruction tape. The segment is then
+    followed again.
+    """
+    half = counts.shape[0] // 2
+    for i in range(half):
+        if not is_rejected:
+            counts[half + i] = counts[i]
+        elif work.int_slots[IS_WANTED] != 0:
+            counts[i] = counts[half + i]
+
+
 def work_space(system: Any, atoms: int = 0, monomials: int = 0) -> EventScratch:
     """Return work arrays for the events of a system; linear modes need additional arrays."""
     guards, count = system.guard_count, len(system.automata)
