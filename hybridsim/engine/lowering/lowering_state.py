@@ -166,8 +166,8 @@ class LoweringState:
 def pattern_of(e: Any, moving: Container[Any] = ()) -> tuple[Any, dict[Any, Any]]:
     """Return an expression with numbered names, and the numbered name of each symbol.
 
-    Copies of a part have the same pattern, and so share symbolic results. The numbers are in the order of the names, on which the order of terms depends. moving : symbols that get another
-    kind of name.
+    Copies of a part have the same pattern, and so share symbolic results. The numbers are in the order of the names, on
+    which the order of terms depends. moving : symbols that get another kind of name.
     """
     numbered = {
         s: sp.Symbol(f"{'moving' if s in moving else 'fixed'}_{i:04d}", real=True)
