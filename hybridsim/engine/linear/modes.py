@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from copy import copy
 from itertools import product
 
 import numpy as np
@@ -20,11 +21,11 @@ _MAX_CACHED = 64  # most cached answers per structure, one for each set of param
 class LinearMode:
     """Linear forms of the rates and active guards in one combination of modes.
 
-    p: the run-time vector, or None for any values.
+    reader: the linear forms of all registers in these modes.
     """
 
-    def __init__(self, system: System, atoms: Atoms, z: np.ndarray, p: Sequence[float] | None) -> None:
-        tape, reader = system.code.data["tape"], _reader(system, atoms, z, p)
+    def __init__(self, system: System, reader: LinearReader, z: np.ndarray) -> None:
+        tape = system.code.data["tape"]
         rates = zip(system.names, tape["derivatives"], strict=True)
         self.rates = [_named(reader, register, f"the rate of {name}") for name, register in rates]
         self.guards: dict[int, Form] = {
@@ -48,6 +49,32 @@ def _reader(system: System, atoms: Atoms, z: np.ndarray, p: Sequence[float] | No
     reader = LinearReader(atoms, tape["time"], tape["states"], constants, parameters, varying, p)
     reader.read(system.mode_rows(z))
     return reader
+
+
+class _Changes:
+    """Reads modes that differ in a few components from the first modes, for which most registers stay as they are."""
+
+    def __init__(self, system: System, p: Sequence[float] | None) -> None:
+        self.system = system
+        self._first = _reader(system, Atoms(), np.zeros(len(system.automata), dtype=np.int64), p)
+        self._parts = [
+            (component, [(rows, {r for row in rows for r in row[1:4]}) for rows in branches])
+            for component, branches in system.code.data["tape"]["parts"]
+        ]
+
+    def mode(self, z: np.ndarray) -> LinearMode:
+        """Return the linear forms in the modes `z`, or raise NotLinear."""
+        reader, changed, modes = copy(self._first), set[int](), z.tolist()
+        reader.forms = dict(reader.forms)
+        for component, branches in self._parts:
+            mode = 0 if component < 0 else modes[component]
+            rows, read = branches[mode]
+            if mode or not read.isdisjoint(changed):
+                reader.read(rows)
+                changed |= {
+                    out + k for *_, out in rows for k in range(2)
+                }  # an operation may have two results
+        return LinearMode(self.system, reader, z)
 
 
 def _named(reader: LinearReader, register: int, title: str) -> Form:
@@ -80,7 +107,7 @@ def modes_of(
     found: list[LinearMode | NoMode] = []
     for z in met[first:]:
         try:
-            found.append(LinearMode(system, atoms, z, p))
+            found.append(LinearMode(system, _reader(system, atoms, z, p), z))
         except DividesByZero:
             if len(met) == 1:
                 raise
@@ -148,9 +175,10 @@ def _reason_at(system: System, p: tuple[float, ...] | None) -> str | None:
         z = vectors[f"while {names} {hold} "] = vectors[""].copy()
         z[list(cluster)] = [max(system.automata[c].hold, 0) for c in cluster]
     reasons: dict[str, str] = {}
+    changes = _Changes(system, p)
     for place, z in reversed(vectors.items()):
         try:
-            LinearMode(system, Atoms(), z, p)
+            changes.mode(z)
         except DividesByZero:
             continue  # no such motion
         except NotLinear as reason:
@@ -182,12 +210,13 @@ def is_linear_beside_corners(system: System) -> bool:
 def _linear_beside_corners_at(system: System, p: tuple[float, ...] | None) -> bool:
     counts = [len(automaton.modes) for automaton in system.automata]
     corners = [c for c, automaton in enumerate(system.automata) if automaton.is_corner]
+    changes = _Changes(system, p)
     for k, c in product(corners, range(len(counts))):
         for side, mode in product(range(1, counts[k]), range(1, counts[c])):
             z = np.zeros(len(counts), dtype=np.int64)
             z[k], z[c] = side, mode
             try:
-                LinearMode(system, Atoms(), z, p)
+                changes.mode(z)
             except DividesByZero:
                 continue  # no such motion
             except NotLinear:
