@@ -71,7 +71,7 @@ class Ensemble:
     def __init__(self, system: System, may_continue: Callable[[], bool]) -> None:
         self.system, self.automata, self.may_continue = system, automata_of(system), may_continue
         self._first = np.zeros(len(system.automata), dtype=np.int64)
-        self.tapes = tape_cache_of(system).with_few()
+        self.tapes = tape_cache_of(system).with_complete_set()
 
     def groups(self, parameters: np.ndarray, starts: np.ndarray, size: int, periods: int) -> Iterator[Group]:
         """Yield the supported points in groups, until `may_continue` returns False.

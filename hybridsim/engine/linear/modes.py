@@ -9,7 +9,8 @@ from itertools import product
 
 import numpy as np
 
-from hybridsim.engine.linear.form import Atoms, DividesByZero, Form, LinearReader, Monomial, NotLinear
+from hybridsim.engine.linear.form import Atoms, DividesByZero, Form, LinearReader, Monomial, NotLinear, Read
+from hybridsim.engine.series.optimise import PAIRED, arguments_of
 from hybridsim.engine.system.per_structure import per_structure
 from hybridsim.engine.system.system import System
 from hybridsim.errors import UsageError
@@ -51,6 +52,14 @@ def _reader(system: System, atoms: Atoms, z: np.ndarray, p: Sequence[float] | No
     return reader
 
 
+def _are_same(one: Read | NotLinear | None, other: Read | NotLinear | None) -> bool:
+    """Return whether two registers have the same linear form; an unknown weight is NaN and equals another one."""
+    if isinstance(one, dict) and isinstance(other, dict):
+        return one.keys() == other.keys() and all(_are_same(w, other[k]) for k, w in one.items())
+    is_unknown = one != one and other != other  # true for NaN only
+    return is_unknown or one == other
+
+
 class _Changes:
     """Reads modes that differ in a few components from the first modes, for which most registers stay as they are."""
 
@@ -58,7 +67,7 @@ class _Changes:
         self.system = system
         self._first = _reader(system, Atoms(), np.zeros(len(system.automata), dtype=np.int64), p)
         self._parts = [
-            (component, [(rows, {r for row in rows for r in row[1:4]}) for rows in branches])
+            (component, [(rows, {r for row in rows for r in arguments_of(row)}) for rows in branches])
             for component, branches in system.code.data["tape"]["parts"]
         ]
 
@@ -71,9 +80,9 @@ class _Changes:
             rows, read = branches[mode]
             if mode or not read.isdisjoint(changed):
                 reader.read(rows)
-                changed |= {
-                    out + k for *_, out in rows for k in range(2)
-                }  # an operation may have two results
+                results = {out + k for op, *_, out in rows for k in range(2 if op in PAIRED else 1)}
+                first, here = self._first.forms, reader.forms
+                changed |= {r for r in results if not _are_same(here.get(r), first.get(r))}
         return LinearMode(self.system, reader, z)
 
 

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 
 from hybridsim.engine.events.compiled.known_time import (
-    GOES_ON,
+    IS_CONTINUED,
     KNOWN,
     SEGMENTS,
     STEPS,
     store_known_times,
 )
-from hybridsim.engine.events.compiled.scratch import IS_WANTED, functions_of
+from hybridsim.engine.events.compiled.scratch import LACKS_TAPE, functions_of
 from hybridsim.engine.events.monitor_corners import MonitorCorners
 from hybridsim.engine.events.outcome import Outcome
 from hybridsim.engine.events.state import HybridState
@@ -189,15 +189,15 @@ class CompiledLoop:
             began = perf_counter()
             code = _event_loop(model, call, arrays.as_packed, arrays.work, record, opaque(own), opaque(rows))
             seconds += perf_counter() - began
-            if not (lacks_tapes := arrays.work.int_slots[IS_WANTED] != 0):
+            if not (lacks_tapes := arrays.work.int_slots[LACKS_TAPE] != 0):
                 break
-            more = tape_cache.with_modes(arrays.work.wanted)
+            more = tape_cache.with_modes(arrays.work.missing)
             found = kernels.tables(more, state, origin, target)
             if found is None or found[1] is not spare:
                 break  # the next call has arrays of another form
             tapes, lin = more, found[0]
             model, own = replaced(model, tapes=tapes, lin=lin), kernels.with_tapes(own, tapes)
-            call.int_slots[GOES_ON] = 1
+            call.int_slots[IS_CONTINUED] = 1
         arrays.own = own
         if known is not None:
             call.known.kinds[0] = -1  # another run with these arrays may have no known times ahead

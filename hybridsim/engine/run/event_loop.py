@@ -36,7 +36,7 @@ from hybridsim.engine.events.compiled.known_time import (
     set_inputs,
     set_origin,
 )
-from hybridsim.engine.events.compiled.scratch import EVENT_LOOP, IS_WANTED, KNOWN_TIME, ROW, SPREAD
+from hybridsim.engine.events.compiled.scratch import EVENT_LOOP, KNOWN_TIME, LACKS_TAPE, ROW, SPREAD
 from hybridsim.engine.native.kernels import (
     call_kernel,
     call_noinline,
@@ -160,7 +160,7 @@ def event_loop(
     advanced by the call, like the clock. work: `EventScratch`. record: `LoopRecord`. own, rows: packs of the method,
     for its arrays and its record. A segment with more steps than fit is committed in parts. A call ends if the event of
     a segment needs modes without an instruction tape (`row_of`). The next call goes on from this segment as if nothing
-    had happened, if `ints[GOES_ON]` is set.
+    had happened, if `ints[IS_CONTINUED]` is set.
     """
     automata, tapes, ints = model.automata, model.tapes, call.int_slots
     target, clock, pace, scale, rates = call.times[:2], call.times[2:], call.pace, call.scale, call.rates
@@ -227,7 +227,7 @@ def event_loop(
         )
         if is_rejected or not resolve(model, at, error, fired, state, work):
             is_rejected, is_ahead = True, False  # the kernel of the segment returns STOPPED
-            if work.int_slots[IS_WANTED] != 0:
+            if work.int_slots[LACKS_TAPE] != 0:
                 pace[0], pace[1], pace[2], pace[SINCE] = gap, ratio, steady, since
             continue
         put(work.x_after, jumps[i, after])

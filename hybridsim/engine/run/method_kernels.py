@@ -59,7 +59,7 @@ class MethodKernels(ABC):
     6. A kernel may set origin and inputs of the next segment in ``state.p`` (`set_origin`, `set_inputs`), and return
        ``at = 0`` and ``is_ahead``. If ``start.is_ahead`` is set then, nothing has changed p since.
     7. If ``start.is_rejected`` is set, the last segment is not committed: restore what the kernel remembers of it, and
-       the outcome is STOPPED. If ``work.int_slots[IS_WANTED]`` is set, a later call repeats this segment: restore also
+       the outcome is STOPPED. If ``work.int_slots[LACKS_TAPE]`` is set, a later call repeats this segment: restore also
        what the kernel counts.
     """
 

@@ -244,9 +244,9 @@ def arguments_of(row: tuple[int, ...]) -> tuple[int, ...]:
 
 def live_rows(rows: Any, live: Any) -> np.ndarray:
     """Return the rows (R, 5) on which the given registers depend, in order."""
-    rows, wanted = row_array(rows), np.array(list(live), dtype=np.int64)
-    is_live = np.zeros(2 + max(rows.max(initial=0), wanted.max(initial=0)), dtype=np.bool_)
-    is_live[wanted] = True
+    rows, needed = row_array(rows), np.array(list(live), dtype=np.int64)
+    is_live = np.zeros(2 + max(rows.max(initial=0), needed.max(initial=0)), dtype=np.bool_)
+    is_live[needed] = True
     is_selected = np.empty(len(rows), dtype=np.bool_)
     _select_live(rows, is_live, is_selected)
     return rows[is_selected]

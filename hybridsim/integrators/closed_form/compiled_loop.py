@@ -42,7 +42,7 @@ class ClosedFormKernels(MethodKernels):
         # as in `ClosedFormArrays.hints` after the last call
         self.hints = np.zeros((0, system.guard_count))
         self.tape_cache = tape_cache_of(system)
-        self.tape_cache.with_few()
+        self.tape_cache.with_complete_set()
         self.columns = 0  # number of modal coordinates
         self.lin: LinearTables
 

@@ -51,7 +51,7 @@ def test_parts_are_those_of_the_tapes_asked_for_while_others_ask() -> None:
     """Parts of another vector of modes have another number of rows: a kernel would read beyond their end."""
     system = System(hs.load("belt"))
     small, large = TapeCache(system), TapeCache(system)
-    large.with_few()
+    large.with_complete_set()
 
     class Overtaken(GuardParts):
         """Right after it has noted the parts of one shelf, another thread asks for those of the other."""

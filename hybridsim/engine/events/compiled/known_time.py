@@ -15,7 +15,13 @@ from hybridsim.engine.events.choice.verdict import FINE
 from hybridsim.engine.events.compiled.after_segment import STAGES
 from hybridsim.engine.events.compiled.guard_series import guard_series
 from hybridsim.engine.events.compiled.resolve_surface import row_verdict
-from hybridsim.engine.events.compiled.scratch import DISCRETE, DISCRETE_AT, IS_WANTED, LocatedEvent, called_by
+from hybridsim.engine.events.compiled.scratch import (
+    DISCRETE,
+    DISCRETE_AT,
+    LACKS_TAPE,
+    LocatedEvent,
+    called_by,
+)
 from hybridsim.engine.linear.guard_coefficients import has_tables, measure_point
 from hybridsim.engine.linear.motion import errors_of_time, functions_of_time
 from hybridsim.engine.native.kernels import call, inlined
@@ -29,7 +35,7 @@ from hybridsim.engine.system.system import System
 
 # Indices of the integers of a loop, `LoopCall.int_slots`: three of them count committed steps and segments and known
 # times that were passed; the last says whether a call goes on with these.
-ORIGIN_AT, PHASES_AT, SIGNALS_AT, STEPS, SEGMENTS, KNOWN, GOES_ON = range(7)
+ORIGIN_AT, PHASES_AT, SIGNALS_AT, STEPS, SEGMENTS, KNOWN, IS_CONTINUED = range(7)
 SINCE = 3  # index of `LoopCall.pace`
 NO_RESET = -1
 
@@ -75,11 +81,11 @@ def store_known_times(arrays: Any, known: KnownTimes, resets: np.ndarray) -> Non
 
 @inlined
 def begin_call(ints: Any, pace: Any, work: Any) -> None:
-    """Prepare the counts of a call, which goes on with those of the last call if GOES_ON is set."""
-    if ints[GOES_ON] == 0:
+    """Prepare the counts of a call, which goes on with those of the last call if IS_CONTINUED is set."""
+    if ints[IS_CONTINUED] == 0:
         pace[0], pace[1], pace[2], pace[SINCE] = math.inf, math.inf, 0.0, 0.0
         ints[STEPS] = ints[SEGMENTS] = ints[KNOWN] = 0
-    ints[GOES_ON] = work.int_slots[IS_WANTED] = 0
+    ints[IS_CONTINUED] = work.int_slots[LACKS_TAPE] = 0
 
 
 @inlined

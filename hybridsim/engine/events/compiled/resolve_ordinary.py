@@ -18,7 +18,7 @@ from hybridsim.engine.events.compiled.scratch import (
     DISCRETE,
     DISCRETE_AT,
     FIRED,
-    IS_WANTED,
+    LACKS_TAPE,
     NOBODY,
     ROW,
     SPREAD,
@@ -184,7 +184,7 @@ def resolve_ordinary(
 def resolve_event(automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any, work: Any) -> int:
     """Resolve the event in the work space and replace the state; return 1, or 0 for other events.
 
-    If modes without an instruction tape are wanted, nothing is decided: the event counts as one of the others. If no
+    If modes without an instruction tape are missing, nothing is decided: the event counts as one of the others. If no
     guard fired, only the series of the active guards are written to the work space. lin: tables of linear modes,
     empty for others. state: `hybridsim.engine.events.state.StateArrays`.
     """
@@ -195,7 +195,7 @@ def resolve_event(automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any, 
         return 1
     if has_tables(lin) and resolve_clear(automata, tapes, lin, state, work, fired):
         return 1
-    if work.int_slots[IS_WANTED] != 0:
+    if work.int_slots[LACKS_TAPE] != 0:
         return 0
     c = automata.owner[fired]
     for d in range(state.z.shape[0]):

@@ -17,7 +17,7 @@ from hybridsim.engine.system.programs.modes_index import find_modes
 
 # Largest number of components at their surfaces at once; more have too many candidates for compiled loops.
 MAX_JOINT_COMPONENTS = 3
-FIRED, DISCRETE, DISCRETE_AT, ROW, IS_WANTED = range(5)  # indices of `EventScratch.int_slots`
+FIRED, DISCRETE, DISCRETE_AT, ROW, LACKS_TAPE = range(5)  # indices of `EventScratch.int_slots`
 AT, AT_ERROR, SPREAD = range(3)  # indices of `EventScratch.float_slots`
 RESOLVE, EVENT_LOOP, SERIES, KNOWN_TIME = range(4)  # indices of `EventScratch.entry_points`
 NOBODY = -1  # no guard fired
@@ -52,8 +52,8 @@ class EventScratch(NamedTuple):
 
     functions: np.ndarray  # addresses (5,): `Functions`
     entry_points: np.ndarray  # addresses (4,) of kernels at RESOLVE, EVENT_LOOP, SERIES, KNOWN_TIME
-    int_slots: np.ndarray  # integers at FIRED, DISCRETE, DISCRETE_AT, ROW, IS_WANTED
-    wanted: np.ndarray  # modes (C,) that have no instruction tape yet, if IS_WANTED is 1
+    int_slots: np.ndarray  # integers at FIRED, DISCRETE, DISCRETE_AT, ROW, LACKS_TAPE
+    missing: np.ndarray  # modes (C,) that have no instruction tape yet, if LACKS_TAPE is 1
     # numbers at AT, AT_ERROR, SPREAD (bounds by which simultaneous guards may be from zero)
     float_slots: np.ndarray
     y: np.ndarray  # states (n,) at the event
@@ -111,13 +111,13 @@ def located(state: Any, work: Any) -> LocatedEvent:
 def row_of(tapes: Any, z: Any, work: Any) -> int:
     """Return the row of a combination of modes in the instruction tapes.
 
-    If there is none, note that the modes are wanted, and return -1. The caller must then decide nothing: the host adds
+    If there is none, note that they are missing, and return -1. The caller must then decide nothing: the host adds
     the tape and calls again.
     """
     k = find_modes(tapes, z)
     if k < 0:
-        work.int_slots[IS_WANTED] = 1
-        put(z, work.wanted)
+        work.int_slots[LACKS_TAPE] = 1
+        put(z, work.missing)
     return k
 
 
@@ -132,7 +132,7 @@ def note_or_restore(counts: Any, is_rejected: bool, work: Any) -> None:
     for i in range(half):
         if not is_rejected:
             counts[half + i] = counts[i]
-        elif work.int_slots[IS_WANTED] != 0:
+        elif work.int_slots[LACKS_TAPE] != 0:
             counts[i] = counts[half + i]
 
 
@@ -156,7 +156,7 @@ def work_space(system: Any, atoms: int = 0, monomials: int = 0) -> EventScratch:
             int_slots=np.array(
                 [-1, len(system.model.discrete), system.layout.discrete_at, -1, 0], dtype=np.int64
             ),
-            wanted=numbers(count),
+            missing=numbers(count),
             float_slots=np.zeros(3),
             **{name: vector_of(system.n) for name in ("y", "y_error", "slopes", "x_after")},
             size=np.zeros(1),

@@ -18,7 +18,7 @@ from hybridsim.engine.events.compiled.resolve_surface import choose_modes, clust
 from hybridsim.engine.events.compiled.scratch import (
     AT,
     AT_ERROR,
-    IS_WANTED,
+    LACKS_TAPE,
     MAX_JOINT_COMPONENTS,
     SERIES,
     LocatedEvent,
@@ -197,7 +197,7 @@ class StartScratch:
 def judged(system: System, call: Callable[[StartScratch], bool]) -> HybridState | None:
     """Return the state that a call of a kernel leaves in its arrays, or None if the kernel returns False.
 
-    The call fills the arrays itself. It is made again as long as it wants the instruction tapes of more modes.
+    The call fills the arrays itself. It is made again as long as it lacks the instruction tapes of some modes.
     """
     spare, cache = spare_scratch(system, "start"), tape_cache_of(system)
     try:
@@ -206,11 +206,11 @@ def judged(system: System, call: Callable[[StartScratch], bool]) -> HybridState 
         scratch = StartScratch(system, cache.tapes)
     while True:
         slots = scratch.work.int_slots
-        slots[IS_WANTED] = 0
+        slots[LACKS_TAPE] = 0
         is_certain = call(scratch)
-        if not slots[IS_WANTED]:
+        if not slots[LACKS_TAPE]:
             break
-        scratch = StartScratch(system, cache.with_modes(scratch.work.wanted))
+        scratch = StartScratch(system, cache.with_modes(scratch.work.missing))
     found = scratch.state.copy() if is_certain else None
     spare.append(scratch)
     return found

@@ -26,7 +26,9 @@ from hybridsim.engine.system.system import System
 from hybridsim.forks import SharedLock
 from hybridsim.model.parts.component import MonitorCorner
 
-FEW = 27  # largest number of few combinations of modes, as for three contacts
+MAX_COMPLETE_SET = (
+    27  # largest number of combinations of modes that a complete set may have, as for three contacts
+)
 
 
 class Automata(NamedTuple):
@@ -170,13 +172,13 @@ class TapeCache:
             self.rows_of(z[None])
         return self.tapes
 
-    def with_few(self) -> Tapes:
+    def with_complete_set(self) -> Tapes:
         """Return the tapes so far, with those of all combinations of modes if these are few.
 
         The tables of linear modes of few combinations are made at once.
         """
         counts = [len(automaton.modes) for automaton in self.system.automata]
-        if len(self._numbers) < math.prod(counts) <= FEW:
+        if len(self._numbers) < math.prod(counts) <= MAX_COMPLETE_SET:
             self.rows_of(np.array(list(product(*map(range, counts))), dtype=np.int64))
         return self.tapes
 
