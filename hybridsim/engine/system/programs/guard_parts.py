@@ -69,8 +69,8 @@ class GuardParts:
                 self._steps.put(k, steps)
                 self._is_linear.put(k, [is_linear])
                 self._count = k + 1
-            is_linear = self._is_linear.up_to(count)
-            parts: Parts = packed(Parts(*self._guards.up_to(count), is_linear, *self._steps.up_to(count)))
+            flags = self._is_linear.up_to(count)
+            parts: Parts = packed(Parts(*self._guards.up_to(count), flags, *self._steps.up_to(count)))
         return parts
 
 
