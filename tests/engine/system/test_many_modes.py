@@ -96,6 +96,34 @@ def test_a_first_run_is_as_later_ones(integrator: str) -> None:
     assert first == later
 
 
+def joined_contacts() -> hs.Model:
+    """Four contacts whose forces act on each other's bodies: at an event several of them may change their modes."""
+    return hs.Model(
+        "joined",
+        [
+            hs.State(
+                f"v{i}",
+                0.0,
+                f"2.5*sin({1 + 0.37 * i}*t + {i}) - f{i} - 0.3*f{(i + 1) % 4} - 0.3*f{(i - 1) % 4} - 0.1*v{i}",
+                nominal=1.0,
+            )
+            for i in range(4)
+        ],
+        contacts=[
+            hs.Contact(f"f{i}", velocity=f"v{i}", normal=1, law="coulomb", arguments={"mu": 0.5})
+            for i in range(4)
+        ],
+    )
+
+
+@pytest.mark.parametrize("integrator", ["taylor", "dop853", "tsit5"])
+def test_modes_that_change_together_are_resolved_as_in_later_runs(integrator: str) -> None:
+    """Candidates that differ in two components had a tape only if an earlier run had entered them."""
+    first, later = first_and_later(joined_contacts(), integrator, 30.0)
+    assert len(first) > 40
+    assert first == later
+
+
 @pytest.mark.parametrize("integrator", ["taylor", "dop853", "tsit5"])
 def test_more_vectors_of_modes_than_are_searched(integrator: str) -> None:
     model = seven_contacts()
