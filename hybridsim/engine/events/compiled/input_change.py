@@ -107,10 +107,10 @@ def _surface_tape(system: System, modes: bytes) -> SurfaceTape:
     discrete = set(
         inputs.parameters[(inputs.sources >= place.start) & (inputs.sources < place.stop)].tolist()
     )
-    rows = [*map(tuple, tape.constant_rows.tolist()), *map(tuple, tape.rows.tolist())]
+    rows = np.concatenate([tape.constant_rows, tape.rows])
 
     def reads_discrete(surface: int) -> bool:
-        read = {surface}.union(*(row[1:4] for row in live_rows(rows, {surface})))
+        read = {surface, *live_rows(rows, [surface])[:, 1:4].ravel().tolist()}
         return not read.isdisjoint(discrete)
 
     surfaces = np.array([r for r in tape.surfaces.tolist() if reads_discrete(r)], dtype=np.int64)
