@@ -136,11 +136,12 @@ LAW_OF_FILE = {
     "type": "object", "properties": {"file": said("a file with one law", TEXT)}, "required": ["file"],
     "additionalProperties": EXPRESSION,
 }  # fmt: skip
+ANY_LAW = {"anyOf": [TEXT, NAMED_LAW, LAW_OF_FILE]}
 CONTACT = table(
     {
         "velocity": said("the relative velocity", EXPRESSION),
         "normal": said("the normal load", EXPRESSION),
-        "law": said("the law's name or file, with its arguments", {"anyOf": [TEXT, NAMED_LAW, LAW_OF_FILE]}),
+        "law": said("the law's name or file, with its arguments", ANY_LAW),
         "opens": said("whether it lifts off where the load would be negative", FLAG),
         "start": said("initial values of the law's states", EXPRESSIONS),
         "nominal": said("usual sizes of the law's states", {"type": "object", "additionalProperties": NUMBER}),
@@ -264,12 +265,18 @@ VALUES = {
         "anyOf": [EXPRESSION, {"type": "array", "items": EXPRESSION}, {"type": "object"}]
     },
 }
+# a law for all copies of a part, one for each copy, or a table of the names of an inner part
+LAWS_OF_USE = {
+    "type": "object",
+    "additionalProperties": {"anyOf": [ANY_LAW, {"type": "array", "items": ANY_LAW}, {"type": "object"}]},
+}
 USE = table(
     {
         "model": said("the file of the part, or the name of a packaged model", TEXT),
         "parameters": said("new values of parameters of the part", VALUES),
         "start": said("new initial values of states of the part", VALUES),
         "connect": said("what each connected input of the part receives", VALUES),
+        "laws": said("new laws of contacts of the part", LAWS_OF_USE),
         "repeat": said("how many copies, NAME1, NAME2, ...; i is the number of a copy", {"type": "integer"}),
     },
     ("model",),

@@ -1,8 +1,8 @@
-"""Run mutated model files and mutated command lines, and look for internal errors, hangs and side effects.
+"""Run mutated model files, random models with parts and mutated command lines, and look for internal errors.
 
-    python docs/studies/fuzz.py [files] [lines] [--count N] [--seed S] [--results FOLDER] [--only K]
+    python docs/studies/fuzz.py [files] [parts] [lines] [--count N] [--seed S] [--results FOLDER] [--only K]
 
-Without a kind both kinds run, with 10^4 cases each by default. This makes docs/studies/fuzz.md in half an hour on one
+Without a kind all kinds run, with 10^4 cases each by default. This makes docs/studies/fuzz.md in half an hour on one
 core. Findings are printed. Cases run in a child process. It is ended if a case takes longer than a minute, and begun
 again after this case. With a folder for results the same command continues where it stopped. `--only K` runs the K-th
 case alone and shows its result. Thousands of models are compiled, so use a separate cache folder in HYBRIDSIM_CACHE.
@@ -23,8 +23,9 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
 from fuzz.judge import COMMANDED, file_case, line_case, sandbox
+from fuzz.parts import parts_case
 
-KINDS = {"files": file_case, "lines": line_case}
+KINDS = {"files": file_case, "parts": parts_case, "lines": line_case}
 COUNT = 10_000
 PAGE = Path(__file__).parents[2] / "docs" / "studies" / "fuzz.md"
 LIMIT = 60.0  # seconds of one case, compilation included; two processes on a core take twice their time
@@ -82,7 +83,7 @@ def read(results: Path) -> list[Case]:
 TEXT = """# Wrong files, wrong command lines
 
 Does a faulty model file or command line ever cause an internal error? {verdict} The script `docs/studies/fuzz.py` ran
-{files} model files and {lines} command lines. They contain typical mistakes of users, editors and scripts, and
+{files} model files, {parts} models with parts and {lines} command lines. They contain typical mistakes of users, editors and scripts, and
 deliberate attacks. No case may cause an internal error, a traceback, a warning of a library, a hang or an unwanted
 file. No text of a file may run as code.
 
@@ -106,6 +107,16 @@ The limits are 2 seconds, 5000 steps and 500 megabytes.
 A *refusal* is an error that names the fault and its place. An error *on running* is an error that only a run can
 find. For example, the method may lack a capability, or no mode may be possible at the start. A case that takes longer
 than {limit:g} seconds is a *hang*. All other endings in the table are statuses of runs.
+
+## Models with parts
+
+Each model has up to five parts from two other files, with random connections, values, laws and numbers of copies. Some
+of these have one of the faults above, a wrong index or an unknown name. Each accepted model is written as one flat
+file, and this file must give the same model. Each refusal must have a file, a message and a remedy.
+
+| ending | models |
+| --- | --- |
+{parts_rows}
 
 ## Command lines
 
@@ -138,7 +149,7 @@ contained a very long word. The tests run a few cases of each kind.
 
 
 def page(found: dict[str, list[Case]]) -> str:
-    """The page with the results of both kinds."""
+    """The page with the results of all kinds."""
     rows = {
         kind: "\n".join(
             f"| {END.get(end, end)} | {n} |" for end, n in Counter(c[1] for c in cases).most_common()
@@ -148,8 +159,10 @@ def page(found: dict[str, list[Case]]) -> str:
     faulty = [f"{kind} {case[0]} ({case[1]})" for kind, cases in found.items() for case in cases if case[2]]
     return TEXT.format(
         files=len(found["files"]),
+        parts=len(found["parts"]),
         lines=len(found["lines"]),
         file_rows=rows["files"],
+        parts_rows=rows["parts"],
         line_rows=rows["lines"],
         commanded=COMMANDED,
         limit=LIMIT,
@@ -169,7 +182,7 @@ END = {
 def main() -> None:
     """Run the selected kinds or one case."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("kinds", nargs="*", metavar="KIND", help="files, lines (default: both)")
+    parser.add_argument("kinds", nargs="*", metavar="KIND", help="files, parts, lines (default: all)")
     parser.add_argument("--count", type=int, default=COUNT, help="cases of each kind (default: 10000)")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument(
@@ -189,7 +202,8 @@ def main() -> None:
     if args.only is not None:
         with sandbox() as folder:
             print(KINDS[kinds[0]](args.seed, args.only, folder))
-            print((folder / "case.toml").read_bytes().decode(errors="backslashreplace")[:3000])
+            for path in sorted(folder.glob("*.toml")):
+                print(path.read_bytes().decode(errors="backslashreplace")[:3000])
         return
     found = {}
     with tempfile.TemporaryDirectory() as temporary:

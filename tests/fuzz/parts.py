@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import builtins
 import random
 from pathlib import Path
-from unittest.mock import patch
 
 import hybridsim as hs
-from fuzz.nasty import CANARY, NUMBERS, UNICODE, nasty_expression
+from fuzz.judge import Finding, observed
+from fuzz.nasty import NUMBERS, UNICODE, nasty_expression
 
 NAMES = (
     "a",
@@ -66,6 +65,11 @@ KEYS = (
     ("start", "left.x", 0.2),
     ("first", "u", 0.2),
 )
+CONTACTS = ("rub", "rub", "rub", "left.rub", "x", "rub.x", "a.b", "''", "_z")
+LAWS = (
+    "'coulomb'", "{ name = 'coulomb', mu = 0.2 }", "{ name = 'pad', c = 'k0' }", "{ force = 'c*v', c = 2 }",
+    "{ name = 'dahl', sigma = 10, mu = 1 }", "{ name = 'coulomb', mu = 'a.k/9' }",
+)  # fmt: skip
 RIGHT = (
     "1", "a.x + 2", "block[2].pull", "block1.pull*t", "sin(t)", "2 if t > a.x else block3.x", "z - a.u",
     "block[1 + 1].x",
@@ -75,11 +79,17 @@ SPRING = """
 u = { kind = "connected" }
 [states]
 x = { start = 0, der = "k*(u - x)" }
+v = { start = 1, der = "-rub" }
 [parameters]
 k = 2
+[contacts.rub]
+velocity = "v"
+normal = 1
+law = { name = "coulomb", mu = 0.5 }
 [outputs]
 pull = "k*(u - x)"
 """
+OWN_LAW = "[laws.pad]\nparameters = ['c']\nforce = 'c*N*v'\n[parameters]\nk0 = 2\n"
 INNER = "[use.left]\nmodel = 'spring.toml'\nconnect.u = 'y'\n[states]\ny = { start = 1, der = 'left.pull' }\n"
 
 
@@ -108,6 +118,25 @@ def value(pick: random.Random, rough: float) -> str:
     )
 
 
+def law(pick: random.Random, rough: float) -> str:
+    """One law of a contact of a part, as TOML; with a probability it is wrong."""
+    if pick.random() > rough:
+        return pick.choice(LAWS)
+    quoted = "'" + expression(pick).replace("'", "").replace("\n", " ") + "'"
+    key = pick.choice(
+        ("mu", "c", "slip", "stick", "force", "states", "tables", "name", "file", "x.y", "v", "N")
+    )
+    wrong = pick.choice(
+        (
+            f"{{ name = 'coulomb', {key} = {quoted} }}", f"{{ {key} = {quoted} }}", f"{{ file = {quoted} }}", quoted,
+            f"{{ force = {quoted}, c = {quoted} }}", f"{{ slip = {quoted}, stick = {quoted}, mu = 1 }}",
+            "3", "true", "[]", "nan", "1979-05-27", "{}", "[[]]", "{ name = { name = 'coulomb' } }",
+        )
+    )  # fmt: skip
+    listed = f"[{', '.join((wrong, *pick.choices(LAWS, k=pick.randrange(4))))}]"
+    return pick.choice((wrong, wrong, listed))
+
+
 def use(pick: random.Random, name: str, rough: float) -> str:
     """One table of a part."""
     if pick.random() < rough:
@@ -119,6 +148,9 @@ def use(pick: random.Random, name: str, rough: float) -> str:
     for key, quantity, share in KEYS:
         if pick.random() < share * (1 if key == "connect" else rough):
             lines.append(f"{key}.{quantity} = {value(pick, rough)}")
+    if pick.random() < 0.3:
+        contact = "rub" if pick.random() > rough else pick.choice(CONTACTS)
+        lines.append(f"laws.{contact} = {law(pick, rough)}")
     if pick.random() < rough / 4:
         lines.pop(pick.randrange(len(lines)))
     return "\n".join([f"[use.{name}]", *lines])
@@ -135,28 +167,27 @@ def files(pick: random.Random) -> dict[str, str]:
     whole = "\n".join(use(pick, name, rough) for name in dict.fromkeys((*names, "block", "a")))
     if pick.random() < 0.5:
         whole += "\n[use.axle]\nmodel = 'inner.toml'\n"
-    whole += f"\n[states]\nz = {{ start = 0, der = {value(pick, rough)} }}\n"
+    whole += f"\n[states]\nz = {{ start = 0, der = {value(pick, rough)} }}\n{OWN_LAW}"
     return {"spring.toml": spring, "inner.toml": inner, "whole.toml": whole}
 
 
-def fault_of(pick: random.Random, folder: Path) -> str:
-    """What is wrong with the treatment of one random model: an empty text if it loads again, or is refused rightly.
+def parts_case(seed: int, number: int, folder: Path) -> Finding:
+    """A random model with parts: it loads and its flat text is the same model, or every fault has a place.
 
-    A refusal has a message and a remedy, and every fault in it has a file. Nothing may run as code.
+    Nothing may run as code.
     """
-    texts = files(pick)
-    for name, text in texts.items():
+    for name, text in files(random.Random(f"parts {seed} {number}")).items():
         (folder / name).write_text(text, encoding="utf-8")
-    ran: list[str] = []
-    with patch.object(builtins, CANARY, lambda: ran.append("code"), create=True):
+    with observed(folder, lambda place: False) as finding:
         try:
             model = hs.load(folder / "whole.toml")
-            if hs.Model.from_toml(model.to_toml()) != model:
-                return "the flat text is another model"
         except hs.ModelError as refusal:
+            finding.end = "refused"
             for single in refusal.errors:
-                if not (single.message and single.place is not None and single.place.file):
-                    return f"no place: {single}"
-        except Exception as crash:
-            return f"{type(crash).__name__}: {crash}"
-    return "a text was run as code" if ran else ""
+                if not (single.message and single.remedy and single.place is not None and single.place.file):
+                    finding.faults.append(f"no message, remedy or place: {single!r}")
+            return finding
+        if hs.Model.from_toml(model.to_toml()) != model:
+            finding.faults.append("the flat text is another model")
+        finding.end = "loaded"
+    return finding

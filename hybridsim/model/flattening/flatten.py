@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import keyword
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import fields, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
-from hybridsim.errors import ModelError, nearest
+from hybridsim.errors import ModelError, UsageError, nearest
 from hybridsim.expr import Expression, parse
 from hybridsim.expr.grammar import RESERVED
 from hybridsim.model.flattening.copies import Copies
 from hybridsim.model.flattening.indexed import INDEX, IndexedExpression
 from hybridsim.model.laws.law_with_states import ContactState
+from hybridsim.model.parts.changes import under_law
 from hybridsim.model.parts.contact import Contact
 from hybridsim.model.parts.declared import Declared
 from hybridsim.model.parts.inputs import HeldInput
@@ -21,6 +22,8 @@ from hybridsim.model.parts.use import Use
 
 if TYPE_CHECKING:
     from hybridsim.model.parts.model import Model
+
+Value = TypeVar("Value")
 
 # Largest number of declarations that parts may add. Checking so many takes about half a minute.
 MAX_DECLARATIONS = 20_000
@@ -102,10 +105,12 @@ def _errors_of_names(model: Model) -> Iterator[ModelError]:
             "parameters": ([parameter.name for parameter in part.parameters], "parameters"),
             "start": (starts, "states"),
             "connect": (inputs, "connected inputs"),
+            "laws": ([contact.name for contact in part.contacts], "contacts"),
         }
         for field, (names, kind) in known.items():
             for name, values in getattr(use, field).items():
-                if name not in names:
+                # the states of a law that replaces another one are known later
+                if name not in names and not (field == "start" and _of_contact(name, part, use.laws)):
                     yield ModelError(
                         f"{what}, {field}: the model '{part.name}' has no {kind.removesuffix('s')} '{name}'",
                         place=values[0].place or use.place,
@@ -151,17 +156,18 @@ class _Flat:
             {name: self._at(use, values, number) for name, values in changes.items()}
             for changes in (use.parameters, use.start, use.connect)
         )
+        contacts = {
+            contact.name: self._contact(use, contact, number, copies, start) for contact in part.contacts
+        }
         for kind in KINDS:
             for declared in getattr(part, kind):
                 if isinstance(declared, ContactState) or (declared.name in connect and kind == "inputs"):
                     continue
-                made = copies.of(declared)
+                made = contacts[declared.name] if kind == "contacts" else copies.of(declared)
                 if kind == "parameters" and declared.name in parameters:
                     made = replace(made, value=parameters[declared.name])
                 elif kind in ("states", "discrete") and declared.name in start:
                     made = replace(made, start=start[declared.name])
-                elif kind == "contacts":
-                    made = replace(made, start={**made.start, **_of_law(declared, part, start)})
                 self.parts[kind].append(made)
         units = {signal.name: signal.unit for signal in part.inputs if signal.name in connect and signal.unit}
         self.connected_units |= {
@@ -171,19 +177,44 @@ class _Flat:
         definitions += [(copies.prefix + name, expr) for name, expr in connect.items()]
         definitions += [(copies.prefix + name, copies.expr(expr)) for name, expr in part.definitions]
 
+    def _contact(
+        self, use: Use, contact: Contact, number: int | None, copies: Copies, start: Mapping[str, Expression]
+    ) -> Contact:
+        """Return the copy of a contact, under another law if the part gets one."""
+        made = copies.of(contact)
+        if contact.name in use.laws:
+            law = _of_copy(use.laws[contact.name], number)
+            arguments = {name: self._at(use, (value,), number) for name, value in law.arguments.items()}
+            try:
+                made = replace(under_law(made, law.law, arguments), place=law.place)
+            except UsageError as fault:
+                message = f"use {use.name}, laws: {fault.message}"
+                self._report(law, ModelError(message, place=law.place, remedy=fault.remedy))
+        states = [state.name for state in use.model.states if isinstance(state, ContactState)]
+        own = {
+            name.removeprefix(contact.variable("")): value
+            for name, value in start.items()
+            if _of_contact(name, use.model, [contact.name]) and (name in states or contact.name in use.laws)
+        }
+        return replace(made, start={**made.start, **own})
+
     def _at(self, use: Use, values: tuple[IndexedExpression, ...], number: int | None) -> Expression:
         """Return the value for one copy; an error in the value is reported."""
-        value = values[0] if len(values) == 1 else values[(number or 1) - 1]
+        value = _of_copy(values, number)
         try:
             expr = value.at(number, self._repeats)
         except ModelError as fault:
-            if id(value) not in self._wrong:  # once for all copies
-                message = f"use {use.name}: {fault.message}"
-                self.errors.append(type(fault)(message, place=fault.place, remedy=fault.remedy))
-            self._wrong.add(id(value))
+            message = f"use {use.name}: {fault.message}"
+            self._report(value, type(fault)(message, place=fault.place, remedy=fault.remedy))
             return parse(0)
         self._used |= expr.names
         return expr
+
+    def _report(self, value: object, fault: ModelError) -> None:
+        """Store the error of a value once for all copies of a part."""
+        if id(value) not in self._wrong:
+            self.errors.append(fault)
+        self._wrong.add(id(value))
 
     def _define_outputs(self) -> None:
         """Add a definition for each output of a part that is used outside the part."""
@@ -201,15 +232,19 @@ class _Flat:
             outputs[k] = replace(output, expr=parse(output.name, output.place))
 
 
-def _of_law(contact: Contact, part: Model, start: Mapping[str, Expression]) -> dict[str, Expression]:
-    """Return the initial values of the states of a contact's law, by the names of the states in the law."""
-    states = {state.name for state in part.states if isinstance(state, ContactState)}
-    found = {}
-    for name in states & start.keys():
-        owner = max((c.variable("") for c in part.contacts if name.startswith(c.variable(""))), key=len)
-        if owner == contact.variable(""):
-            found[name.removeprefix(owner)] = start[name]
-    return found
+def _of_copy(values: tuple[Value, ...], number: int | None) -> Value:
+    """Return the value for one copy, from one value for all copies or one for each copy."""
+    return values[0] if len(values) == 1 else values[(number or 1) - 1]
+
+
+def _of_contact(name: str, part: Model, contacts: Collection[str]) -> bool:
+    """Return whether a name can be that of a state of the law of one of some contacts of a part."""
+    if any(
+        name == state.name and not isinstance(state, ContactState) for state in (*part.states, *part.discrete)
+    ):
+        return False
+    owners = [contact for contact in part.contacts if name.startswith(contact.variable(""))]
+    return bool(owners) and max(owners, key=lambda contact: len(contact.name)).name in contacts
 
 
 def _expressions(value: Any) -> Iterator[Expression]:

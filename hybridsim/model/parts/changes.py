@@ -75,7 +75,7 @@ def with_law(
     if name not in found:
         remedy = nearest(str(name), found, kind="contacts")
         raise UsageError(f"the model '{model.name}' has no contact {name!r}", remedy=remedy)
-    changed = _with_law(found[name], law, passed)
+    changed = under_law(found[name], law, passed)
     gone = {s.name for s in states_of(found[name])} - {s.name for s in states_of(changed)}
     copy = replace(
         model,
@@ -86,7 +86,8 @@ def with_law(
     return copy.validate()
 
 
-def _with_law(contact: Contact, law: FrictionLaw | str, passed: Mapping[str, Any]) -> Contact:
+def under_law(contact: Contact, law: FrictionLaw | str, passed: Mapping[str, Any]) -> Contact:
+    """Return the contact with another law; parameters that are not passed keep their values."""
     fresh = Contact(contact.name, contact.velocity, contact.normal, law)  # type: ignore[arg-type]  # loads a name
     law, title = fresh.law, f"contact {contact.name}"
     for name in passed:
@@ -107,7 +108,7 @@ def _with_law(contact: Contact, law: FrictionLaw | str, passed: Mapping[str, Any
         values = ", ".join(f"{name}=..." for name in missing)
         raise UsageError(
             f"{title}: the law '{law.name}' needs a value for {', '.join(map(repr, missing))}",
-            remedy=f"pass {values}; the contact has {_listed(contact)}",
+            remedy=f"add {values}; the contact has {_listed(contact)}",
         )
     states = {state.name for state in law.states}
 

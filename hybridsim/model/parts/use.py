@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from numbers import Integral
 from typing import TYPE_CHECKING, Any
@@ -11,6 +11,7 @@ from hybridsim.errors import ExpressionError
 from hybridsim.model.flattening.indexed import IndexedExpression, parse_indexed
 from hybridsim.model.parts.declared import Declared
 from hybridsim.model.parts.frozen_map import FrozenMap
+from hybridsim.model.parts.law_of_use import LawOfUse, law_of_use
 
 if TYPE_CHECKING:
     from hybridsim.model.parts.model import Model
@@ -44,6 +45,9 @@ class Use(Declared):
         Expression of each connected input of the part.
     repeat : int, optional
         Number of copies. The values of the mappings may then be lists with one value per copy.
+    laws : mapping of str to FrictionLaw, str or tuple, optional
+        Another law for contacts of the part, as in `Model.with_law`, or a pair of a law and the values of its
+        parameters. The values are expressions of the whole model.
     place : Place, optional
         Place of the declaration, for error messages.
 
@@ -63,6 +67,7 @@ class Use(Declared):
     start: Mapping[str, tuple[IndexedExpression, ...]] = field(default_factory=FrozenMap)
     connect: Mapping[str, tuple[IndexedExpression, ...]] = field(default_factory=FrozenMap)
     repeat: int | None = None
+    laws: Mapping[str, tuple[LawOfUse, ...]] = field(default_factory=FrozenMap)
 
     def __post_init__(self) -> None:
         self._texts("name")
@@ -78,24 +83,39 @@ class Use(Declared):
                 remedy = f"use a whole number from 1 to {MAX_REPEAT}, or omit `repeat`"
                 raise self._fault(f"`repeat` cannot be {repeat!r}", remedy)
             object.__setattr__(self, "repeat", number)
-        for name in ("parameters", "start", "connect"):
+        for name in ("parameters", "start", "connect", "laws"):
             items = getattr(self, name)
+            entries = "laws" if name == "laws" else "expressions"
             if not isinstance(items, Mapping) or not all(isinstance(key, str) for key in items):
-                raise self._fault(f"`{name}` cannot be {items!r}", "use a dict of names and expressions")
-            values = {key: self._values(f"{name}[{key!r}]", value) for key, value in items.items()}
+                raise self._fault(f"`{name}` cannot be {items!r}", f"use a dict of names and {entries}")
+            single = self._law if name == "laws" else self._parsed_value
+            values = {key: self._values(f"{name}[{key!r}]", value, single) for key, value in items.items()}
             object.__setattr__(self, name, FrozenMap(values))
 
-    def _values(self, what: str, value: Any) -> tuple[IndexedExpression, ...]:
-        """Return one expression for all copies, or one for each copy."""
-        listed = value if isinstance(value, list | tuple) else [value]
+    def _values(self, what: str, value: Any, single: Callable[[str, Any], Any]) -> tuple[Any, ...]:
+        """Return one value for all copies, or one for each copy; a pair (law, parameters) is a single value."""
+        is_pair = isinstance(value, tuple) and len(value) == 2 and isinstance(value[1], Mapping)
+        listed = value if isinstance(value, list | tuple) and not is_pair else [value]
         if len(listed) != 1 and len(listed) != self.repeat:
             copies = f"{self.repeat} copies" if self.repeat else "one copy"
             raise self._fault(f"`{what}` has {len(listed)} values for {copies}", "use one value per copy")
+        return tuple(single(what, one) for one in listed)
+
+    def _parsed_value(self, what: str, value: Any) -> IndexedExpression:
         try:
-            return tuple(parse_indexed(single, self.place) for single in listed)
+            return parse_indexed(value, self.place)
         except ExpressionError as fault:
             message = f"{self._title}, {what}: {fault.message}"
             raise ExpressionError(message, place=fault.place, remedy=fault.remedy) from None
+
+    def _law(self, what: str, value: Any) -> LawOfUse:
+        found = law_of_use(
+            value, lambda name, single: self._parsed_value(f"{what}, {name}", single), self.place
+        )
+        if found is None:
+            remedy = "use a law, or a pair (law, parameters), such as ('coulomb', {'mu': 0.3})"
+            raise self._fault(f"`{what}` cannot be {value!r}", remedy)
+        return found
 
     def numbers(self) -> tuple[int | None, ...]:
         """Return the numbers 1, 2, ... of the copies, or a single None for a part that is not repeated."""

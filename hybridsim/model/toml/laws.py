@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from hybridsim.errors import ModelError, UsageError, nearest
+from hybridsim.errors import ModelError, Place, UsageError, nearest
 from hybridsim.expr import Expression, parse
 from hybridsim.model.laws.law import SPEED, FrictionLaw
 from hybridsim.model.laws.law_table import LawTable
@@ -22,6 +22,9 @@ KEYS = (
 _OWN = ("name", "file", *KEYS)
 _BRINGS = ("slip", "stick", "force")
 _POINTS = ("at", "values")
+_EXAMPLE = '{ name = "coulomb", mu = 0.5 }'
+
+Laws = Mapping[str, FrictionLaw]  # the laws that a file declares, by name
 
 
 def read_laws(root: Table, folder: Path) -> dict[str, FrictionLaw]:
@@ -29,40 +32,51 @@ def read_laws(root: Table, folder: Path) -> dict[str, FrictionLaw]:
     found = {}
     for name, table in root.entries("laws", "law"):
         table.only(*KEYS)
-        law = _law(name, table, {}, folder)
+        law = _law(name, table, (), folder)
         if law is not None:
             found[name] = law
     return found
 
 
 def read_law_of_contact(
-    contact: Table, laws: dict[str, FrictionLaw], folder: Path
+    contact: Table, laws: Laws, folder: Path
 ) -> tuple[FrictionLaw, dict[str, Expression]] | None:
-    """Return the law and the arguments of a contact, or None after reporting an unknown law.
-
-    ``law = { name = "coulomb", mu = "mu" }`` refers to a law of the file or the package, and
-    ``law = { file = "pad.toml", mu = "mu" }`` to the law in a file of its own. With ``slip`` and ``stick``, or with
-    ``force``, the table declares the law itself, and every other key is a parameter with its value.
-    """
-    if not contact.require("law", 'write law = { name = "coulomb", mu = 0.5 }'):
+    """Return the law and the arguments of a contact, or None after reporting an unknown law."""
+    if not contact.require("law", f"write law = {_EXAMPLE}"):
         return None
     table = contact.sub(contact.data["law"], f"{contact.kind}, law", "name", "law")
-    if table is None:
-        return None
-    arguments = {key: table.parsed(value, key) for key, value in table.data.items() if key not in _OWN}
+    return None if table is None else read_law(table, str(contact.path[-1]), laws, folder)
+
+
+def read_law(
+    table: Table, contact: str, laws: Laws, folder: Path, form: Callable[[Any, Place], Any] = parse
+) -> tuple[FrictionLaw, dict[str, Any]] | None:
+    """Return the law and the arguments that a table gives to a contact, or None after reporting an unknown law.
+
+    ``{ name = "coulomb", mu = "mu" }`` refers to a law of the file or the package, and
+    ``{ file = "pad.toml", mu = "mu" }`` to the law in a file of its own. With ``slip`` and ``stick``, or with
+    ``force``, the table declares the law itself, and every other key is a parameter with its value.
+
+    Parameters
+    ----------
+    form : reads the value of an argument.
+    """
+    arguments = {
+        key: table.parsed(value, key, form=form) for key, value in table.data.items() if key not in _OWN
+    }
     if "file" in table.data:
         own = _of_file(table, folder)
         return None if own is None else (own, arguments)
     name = table.text("name")
     if any(key in table.data for key in _BRINGS):
-        own = _law(name or str(contact.path[-1]), table, arguments, folder)
+        own = _law(name or contact, table, arguments, folder)
         return None if own is None else (own, arguments)
     for key in KEYS:
         if key in table.data:
             table.fail(
                 f"'{key}' is allowed only in the declaration of a law", f"write it in [laws.{name}]", key
             )
-    if not table.require("name", 'write law = { name = "coulomb", mu = 0.5 }'):
+    if not table.require("name", f"write {_EXAMPLE}"):
         return None
     law = laws.get(name) or _packaged(name)
     if law is None:
@@ -104,7 +118,7 @@ def _of_file(table: Table, folder: Path) -> FrictionLaw | None:
     return law
 
 
-def _law(name: str, table: Table, arguments: dict[str, Expression], folder: Path) -> FrictionLaw | None:
+def _law(name: str, table: Table, arguments: Iterable[str], folder: Path) -> FrictionLaw | None:
     declared: Any = table.data.get("parameters", {})
     parameters: dict[str, Expression | None] = {}
     if isinstance(declared, list):

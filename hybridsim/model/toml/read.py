@@ -124,7 +124,7 @@ def _declared(root: Table, name: str, files: PartFiles) -> Model:
     if root.data.get("schema", SCHEMA) != SCHEMA:
         root.fail(f"unknown schema {root.data['schema']!r}", f"write schema = {SCHEMA}", "schema")
     laws = read_laws(root, folder)
-    uses = tuple(read_uses(root, folder, files))
+    uses = tuple(read_uses(root, folder, files, laws))
     return Model(
         name=name,
         use=() if root.source.errors else uses,

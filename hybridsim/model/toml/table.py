@@ -150,9 +150,9 @@ class Table:
             self.source.errors.append(ExpressionError(message, place=fault.place, remedy=fault.remedy))
             return form(0, place)
 
-    def mapping(self, key: str) -> dict[str, Any]:
+    def mapping(self, key: str, kind: str = "expressions") -> dict[str, Any]:
         """Return a table unchanged, or an empty table if the key is missing."""
-        return dict(self._typed(key, dict, "a table of expressions", {}))
+        return dict(self._typed(key, dict, f"a table of {kind}", {}))
 
     def expressions(self, key: str) -> dict[str, Expression]:
         """Return a table of expressions, or an empty table if the key is missing."""

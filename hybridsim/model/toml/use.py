@@ -7,10 +7,12 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hybridsim.errors import ModelError
+from hybridsim.errors import ModelError, nearest
 from hybridsim.model.flattening.indexed import IndexedExpression, parse_indexed
 from hybridsim.model.parts.frozen_map import FrozenMap
+from hybridsim.model.parts.law_of_use import LawOfUse
 from hybridsim.model.parts.use import MAX_REPEAT, Use
+from hybridsim.model.toml.laws import Laws, read_law
 from hybridsim.model.toml.table import Table
 
 if TYPE_CHECKING:
@@ -74,10 +76,10 @@ class PartFiles:
         return self._models[key]
 
 
-def read_uses(root: Table, folder: Path, files: PartFiles) -> Iterator[Use]:
-    """Yield the parts of a file; paths of their models are relative to ``folder``."""
+def read_uses(root: Table, folder: Path, files: PartFiles, laws: Laws) -> Iterator[Use]:
+    """Yield the parts of a file; paths of models are relative to ``folder``, and ``laws`` are those of the file."""
     for name, table in root.entries("use", "use"):
-        table.only("model", "parameters", "start", "connect", "repeat")
+        table.only("model", "parameters", "start", "connect", "laws", "repeat")
         if not table.require("model", 'write model = "FILE.toml", or the name of a packaged model'):
             continue
         part = files.model(table, folder)
@@ -89,7 +91,8 @@ def read_uses(root: Table, folder: Path, files: PartFiles) -> Iterator[Use]:
             FrozenMap(_values(table, field, repeat)) for field in ("parameters", "start", "connect")
         )
         if part is not None:
-            yield Use(name, part, parameters, start, connect, repeat, place=table.place)
+            changed = FrozenMap(_laws(table, part, repeat, laws, folder))
+            yield Use(name, part, parameters, start, connect, repeat, changed, place=table.place)
 
 
 def _values(
@@ -97,19 +100,54 @@ def _values(
 ) -> Iterator[tuple[str, tuple[IndexedExpression, ...]]]:
     """Yield the names and values of a table; a table inside this table gives names with dots, such as hub.x."""
     for keys, value in _leaves(table.mapping(field), ()):
-        name = ".".join(keys)
-        listed = value if isinstance(value, list) else [value]
-        if isinstance(value, list) and len(value) != repeat:
-            copies = f"{repeat} copies" if repeat else "one copy"
-            table.fail(
-                f"{field}, {name}: {len(value)} values for {copies}", "write one value per copy", field, *keys
-            )
-            continue
-        parsed = []
-        for k, single in enumerate(listed):
-            place: tuple[str | int, ...] = (*keys, k) if isinstance(value, list) else keys
-            parsed.append(table.parsed(single, field, *place, form=parse_indexed))
-        yield name, tuple(parsed)
+        single = _of_copies(table, value, repeat, field, *keys)
+        if single:
+            yield ".".join(keys), tuple(table.parsed(one, *at, form=parse_indexed) for at, one in single)
+
+
+def _laws(
+    table: Table, part: Model, repeat: int | None, laws: Laws, folder: Path
+) -> Iterator[tuple[str, tuple[LawOfUse, ...]]]:
+    """Yield the contacts of a part that get another law, with this law."""
+    for keys, value in _contacts(table, part, table.mapping("laws", "laws"), ()):
+        found, copies = [], _of_copies(table, value, repeat, "laws", *keys)
+        for at, one in copies:
+            own = table.sub(one, f"{table.kind}, laws.{'.'.join(keys)}", "name", *at)
+            law = None if own is None else read_law(own, keys[-1], laws, folder, parse_indexed)
+            if own is not None and law is not None:
+                found.append(LawOfUse(law[0], FrozenMap(law[1]), own.place))
+        if copies and len(found) == len(copies):
+            yield ".".join(keys), tuple(found)
+
+
+def _contacts(
+    table: Table, part: Model, values: Mapping[str, Any], keys: tuple[str, ...]
+) -> Iterator[tuple[tuple[str, ...], Any]]:
+    """Yield the keys of contacts and what `laws` has for each; an unknown contact is reported."""
+    contacts = [contact.name for contact in part.contacts]
+    for key, value in values.items():
+        path = (*keys, key)
+        name = ".".join(path)
+        if name in contacts:
+            yield path, value
+        elif isinstance(value, dict) and any(contact.startswith(f"{name}.") for contact in contacts):
+            yield from _contacts(table, part, value, path)
+        else:
+            message = f"laws: the model '{part.name}' has no contact '{name}'"
+            table.fail(message, nearest(name, contacts, kind="contacts"), "laws", *path)
+
+
+def _of_copies(
+    table: Table, value: Any, repeat: int | None, field: str, *keys: str
+) -> list[tuple[tuple[str | int, ...], Any]]:
+    """Return one value for all copies, or one for each copy, with its keys; a wrong number of values is reported."""
+    if not isinstance(value, list):
+        return [((field, *keys), value)]
+    if len(value) == repeat:
+        return [((field, *keys, k), single) for k, single in enumerate(value)]
+    copies, name = f"{repeat} copies" if repeat else "one copy", ".".join(keys)
+    table.fail(f"{field}, {name}: {len(value)} values for {copies}", "write one value per copy", field, *keys)
+    return []
 
 
 def _leaves(values: Mapping[str, Any], keys: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Any]]:

@@ -189,4 +189,4 @@ def test_the_page_on_parts_prints_what_it_says(
     (tmp_path / "shown.py").write_text(code, encoding="utf-8")
     runpy.run_path(str(tmp_path / "shown.py"))
     assert capsys.readouterr().out.splitlines() == shown
-    assert len(shown) == 5
+    assert len(shown) == 7
