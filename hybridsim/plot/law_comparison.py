@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,11 +14,13 @@ from hybridsim.plot.shared.smooth_parts import smooth_parts_of, unit_of, window_
 
 if TYPE_CHECKING:
     from hybridsim.analysis import LawComparison
+    from hybridsim.analysis.laws.law_comparison import LawRow
 
 
 def law_comparison(comparison: LawComparison) -> tuple[Axes, Axes]:
-    """Draw the force of the contact over the quantity for each law, and the amplitudes as bars in the same colours.
+    """Draw the force of the contact over the quantity for each law, and a measure of each run as bars.
 
+    The bars show the first reading of the comparison, or the amplitude. A complex reading is drawn as its magnitude.
     The area of a loop is the energy loss per period if the quantity is the relative displacement.
     """
     across, up, rows = comparison.quantity, comparison.contact, comparison.rows
@@ -26,25 +29,48 @@ def law_comparison(comparison: LawComparison) -> tuple[Axes, Axes]:
     loops, bars = figure.subplots(1, 2, width_ratios=(3, 2))
     units = [unit_of(rows[0].solution, name) for name in (across, up)]
     ends = {across: [0.0], up: [0.0]}
+    sizes: list[float | None] = []
+    name, unit = f"amplitude of {across}", units[0]
+    if comparison.readings:
+        name = comparison.readings[0]
+        unit = comparison.units.get(name, "")
     for k, row in enumerate(rows):
         colour = style.PALETTE[k % len(style.PALETTE)]
         if row.solution.t_end > row.solution.t_start:
             parts = smooth_parts_of(row.solution, (across, up), window_of(row.solution, None))
             x, y = (np.concatenate([part.values[name] for part in parts]) for name in (across, up))
             loops.plot(x, y, color=colour, linewidth=1.4, linestyle=("-", "--", "-.", ":")[k % 4])
-            for name, values in ((across, x), (up, y)):
-                ends[name] += [values.min(), values.max()]
-        size = row.amplitude_of_quantity
-        bars.barh(k, size or 0.0, color=colour, height=0.6)
-        text = "no result" if size is None else with_prefix(float(f"{size:.3g}"), units[0]) if size else "0"
-        bars.annotate(f" {text}", (size or 0.0, k), va="center", fontsize=9)
+            for axis, values in ((across, x), (up, y)):
+                ends[axis] += [values.min(), values.max()]
+        sizes.append(_size(row, comparison))
+        bars.barh(k, sizes[k] or 0.0, color=colour, height=0.6)
+        bars.annotate(f" {_text(sizes[k], unit)}", (max(sizes[k] or 0.0, 0.0), k), va="center", fontsize=9)
     label_axis(loops.xaxis, across, units[0], min(ends[across]), max(ends[across]))
     label_axis(loops.yaxis, up, units[1], min(ends[up]), max(ends[up]))
-    sizes = [row.amplitude_of_quantity or 0.0 for row in rows]
-    label_axis(bars.xaxis, f"amplitude of {across}", units[0], 0.0, max(sizes))
+    drawn = [0.0, *(size for size in sizes if size is not None)]
+    label_axis(bars.xaxis, name, unit, min(drawn), max(drawn))
     bars.set_yticks(range(len(rows)), [style.literal(row.label) for row in rows])
     bars.invert_yaxis()
     bars.margins(x=0.25)
     for axes in (loops, bars):
         style.dress(axes)
     return loops, bars
+
+
+def _size(row: LawRow, comparison: LawComparison) -> float | None:
+    """Return the finite number that the bar of a law shows, or None."""
+    if not comparison.readings:
+        return row.amplitude_of_quantity
+    value = row.measured[comparison.readings[0]]
+    if value is None or isinstance(value, str):
+        return None
+    size = float(abs(value) if isinstance(value, complex) else value)
+    return size if math.isfinite(size) else None
+
+
+def _text(size: float | None, unit: str) -> str:
+    if size is None:
+        return "no result"
+    rounded = float(f"{size:.3g}")
+    sign = "-" if rounded < 0.0 else ""
+    return sign + with_prefix(abs(rounded), unit) if rounded else "0"

@@ -9,6 +9,7 @@ from typing import Any
 from hybridsim.analysis.compare.comparison_request import mapping, run_span
 from hybridsim.analysis.keyword_options import refuse_unknown
 from hybridsim.analysis.laws.law_comparison import LawComparison, LawRow
+from hybridsim.analysis.laws.law_readings import law_readings
 from hybridsim.arguments import cannot_be, chosen_model, is_row, known_name
 from hybridsim.calls import refusing
 from hybridsim.engine.system.period import forcing_period
@@ -28,6 +29,7 @@ def compare_laws(
     *,
     contact: str | None = None,
     quantity: str | None = None,
+    measure: str | Sequence[str] | None = None,
     params: Mapping[str, Any] | None = None,
     x0: Mapping[str, Any] | None = None,
     **options: Any,
@@ -49,6 +51,10 @@ def compare_laws(
         Name of the contact, if the model has several.
     quantity : str, optional
         State or output whose amplitude is measured; by default the first state.
+    measure : str or sequence of str, optional
+        Names of readings as in `sweep`, in place of amplitude, stops and energy loss: ``"rms.v"``,
+        ``["maximum.x", "stick_fraction.f"]``. If the whole run is measured, also ``"final.x"`` and
+        ``"first_passage.x>0.1"``; over a period, also ``"harmonic.x.1"``.
     params, x0 : mapping of str to float, optional
         Parameter values and initial values by name, instead of the declared values.
     **options : object
@@ -83,12 +89,14 @@ def compare_laws(
     is_last_period = period is not None and t1 - t0 > period
     if is_last_period:
         options |= {"keep": period}
-    rows = [
-        LawRow(label, changed, simulate(changed, (t0, t1), **options), contact, quantity, is_last_period)
-        for label, changed in models.items()
-    ]
+    readings = law_readings(measure, models.values(), period if is_last_period else None)
+    rows = []
+    for label, changed in models.items():
+        run = simulate(changed, (t0, t1), **options)
+        rows.append(LawRow(label, changed, run, contact, quantity, is_last_period, readings.of(run)))
     measured = (t1 - period, t1) if is_last_period and period is not None else (t0, t1)
-    return LawComparison(model.title or model.name, contact, quantity, measured, tuple(rows))
+    title = model.title or model.name
+    return LawComparison(title, contact, quantity, measured, tuple(rows), readings.names)
 
 
 def contact_of(model: Model, contact: Any) -> str:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from importlib import import_module
 from typing import Any
 
 from hybridsim.analysis.compare.table import milliseconds
 from hybridsim.analysis.steady.measures import Measures
+from hybridsim.analysis.sweep.named_measures import units_of_readings
 from hybridsim.model import Model
 from hybridsim.presentation.readable import Readable, aligned
 from hybridsim.solution import Solution
@@ -23,6 +25,7 @@ class LawRow(Measures):
     contact: str
     quantity: str
     is_period: bool  # whether the solution is one period of the forcing
+    measured: Mapping[str, Any] = field(default_factory=dict)  # the readings of `measure`, by name
 
     @property
     def amplitude_of_quantity(self) -> float | None:
@@ -65,7 +68,10 @@ class LawComparison(Readable):
     t_span : tuple of float
         The measured interval: the last period of the forcing, or the whole run of a model without a period.
     rows : tuple of LawRow
-        One row per law with its ``label``, ``model``, ``solution`` and measures.
+        One row per law with its ``label``, ``model``, ``solution`` and measures. ``measured`` contains the readings
+        by name. A reading is None if the run failed, or if the law lacks it.
+    readings : tuple of str, optional
+        Names of the readings that replace amplitude, stops and energy loss.
 
     Examples
     --------
@@ -80,15 +86,25 @@ class LawComparison(Readable):
     quantity: str
     t_span: tuple[float, float]
     rows: tuple[LawRow, ...]
+    readings: tuple[str, ...] = ()
 
     @property
     def labels(self) -> tuple[str, ...]:
         """The names of the laws; no two names are equal."""
         return tuple(row.label for row in self.rows)
 
+    @property
+    def units(self) -> dict[str, str]:
+        """The declared units of the readings, by name."""
+        return units_of_readings(self.readings, self.rows[0].model)
+
     def __repr__(self) -> str:
         t0, t1 = self.t_span
-        head = ("law", f"amplitude of {self.quantity}", "stops", "energy loss", "wall time")
+        head = (
+            "law",
+            *(self.readings or (f"amplitude of {self.quantity}", "stops", "energy loss")),
+            "wall time",
+        )
         lines = [f"{self.title}: laws of contact {self.contact}, t = {t0:g} to {t1:g}"]
         lines += aligned([head, *(_cells(row) for row in self.rows)], "  ")
         failed = [row for row in self.rows if not row.solution.success]
@@ -104,13 +120,14 @@ class LawComparison(Readable):
                 "amplitude": row.amplitude_of_quantity,
                 "stops": row.stops,
                 "energy_loss": row.energy_loss,
+                **row.measured,
                 "wall_time": row.solution.stats["wall_time"],
             }
             for row in self.rows
         ]
 
     def plot(self) -> Any:
-        """Draw the friction loops and the amplitudes side by side.
+        """Draw the friction loops, and the amplitudes or the first reading, side by side.
 
         Returns the axes; ``hybridsim.plot.save`` writes them to a file.
         """
@@ -119,11 +136,18 @@ class LawComparison(Readable):
 
 
 def _cells(row: LawRow) -> tuple[str, ...]:
-    amplitude, stops, loss = row.amplitude_of_quantity, row.stops, row.energy_loss
+    values = (
+        row.measured.values() if row.measured else (row.amplitude_of_quantity, row.stops, row.energy_loss)
+    )
+    run = row.solution
     return (
         row.label,
-        "-" if amplitude is None else f"{amplitude:.6g}",
-        "-" if stops is None else str(stops),
-        "-" if loss is None else f"{loss:.6g}",
-        milliseconds(row.solution.stats["wall_time"]) if row.solution.success else row.solution.status,
+        *map(_cell, values),
+        milliseconds(run.stats["wall_time"]) if run.success else run.status,
     )
+
+
+def _cell(value: Any) -> str:
+    if value is None:
+        return "-"
+    return str(value) if isinstance(value, str | int) else f"{value:.6g}"

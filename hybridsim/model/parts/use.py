@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 from hybridsim.errors import ExpressionError
 from hybridsim.model.flattening.indexed import IndexedExpression, parse_indexed
+from hybridsim.model.laws.law import FrictionLaw
 from hybridsim.model.parts.declared import Declared
 from hybridsim.model.parts.frozen_map import FrozenMap
-from hybridsim.model.parts.law_of_use import LawOfUse, law_of_use
+from hybridsim.model.parts.law_of_use import LawOfUse
 
 if TYPE_CHECKING:
     from hybridsim.model.parts.model import Model
@@ -109,13 +110,19 @@ class Use(Declared):
             raise ExpressionError(message, place=fault.place, remedy=fault.remedy) from None
 
     def _law(self, what: str, value: Any) -> LawOfUse:
-        found = law_of_use(
-            value, lambda name, single: self._parsed_value(f"{what}, {name}", single), self.place
-        )
-        if found is None:
+        """Return a law with the values of its parameters, from a law, its name or path, or a pair with the values."""
+        if isinstance(value, LawOfUse):
+            return value
+        law, values = value if isinstance(value, tuple) and len(value) == 2 else (value, {})
+        if isinstance(law, str):
+            from hybridsim.model.library import load_law
+
+            law = load_law(law)
+        if not isinstance(law, FrictionLaw) or not isinstance(values, Mapping):
             remedy = "use a law, or a pair (law, parameters), such as ('coulomb', {'mu': 0.3})"
             raise self._fault(f"`{what}` cannot be {value!r}", remedy)
-        return found
+        arguments = {name: self._parsed_value(f"{what}, {name}", one) for name, one in values.items()}
+        return LawOfUse(law, FrozenMap(arguments), self.place)
 
     def numbers(self) -> tuple[int | None, ...]:
         """Return the numbers 1, 2, ... of the copies, or a single None for a part that is not repeated."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import exp
+from math import exp, inf, log
 
 import pytest
 
@@ -122,6 +122,53 @@ def test_the_picture_has_a_loop_and_a_bar_for_each_law() -> None:
     assert [bar.get_facecolor()[:3] for bar in bars.patches] != [bars.patches[0].get_facecolor()[:3]] * 2
 
 
+def test_readings_of_a_block_that_slides_to_rest() -> None:
+    """Coulomb: it stops at V/(mu*g) after V**2/(2*mu*g). Viscous: it never stops, and v(4) = V*exp(-4*c)."""
+    names = ["final.v", "maximum.x", "stick_fraction.f", "first_passage.x>0.5"]
+    found = hs.compare_laws(block(), ["coulomb", THICK], (0, 4), measure=names)
+    coulomb, viscous = (row.measured for row in found.rows)
+    assert found.readings == tuple(names)
+    a = 0.3 * G
+    passage = (V - (V**2 - 2 * a * 0.5) ** 0.5) / a
+    assert [*coulomb.values()] == pytest.approx(
+        [0, V**2 / (2 * a), 1 - V / a / 4, passage], rel=1e-9, abs=1e-12
+    )
+    assert viscous["final.v"] == pytest.approx(V * exp(-4 * a), rel=1e-5)
+    assert viscous["first_passage.x>0.5"] == pytest.approx(-log(1 - 0.5 * a / V) / a, rel=1e-6)
+    assert viscous["stick_fraction.f"] is None  # a law without stick
+    assert found.records()[0]["maximum.x"] == coulomb["maximum.x"]
+    head, first, second = repr(found).splitlines()[1:]
+    assert all(name in head for name in names) and "stops" not in head
+    assert first.split()[2] == f"{V**2 / (2 * a):.6g}" and second.split()[3] == "-"
+    _, bars = found.plot()
+    assert [bar.get_width() for bar in bars.patches] == [row.measured["final.v"] for row in found.rows]
+    assert "final" in bars.get_xlabel()
+
+
+def test_readings_of_the_last_period_and_of_states_that_a_law_brings() -> None:
+    """A mass without friction force follows its base: the first harmonic of a sine with amplitude 2 is -2j."""
+    states = [hs.State("x", 0, "v", nominal=1), hs.State("v", 6, "-18*sin(3*t) - f", nominal=1)]
+    model = hs.Model("sine", states, contacts=[hs.Contact("f", "v", 1, "coulomb", {"mu": 0.1})])
+    names = ["amplitude.x", "rms.v", "harmonic.x.1", "amplitude.f_z"]
+    free = hs.FrictionLaw("free", force="0*v")
+    found = hs.compare_laws(model, [free, ("dahl", {"sigma": 10})], (0, 7), measure=names)
+    first, second = (row.measured for row in found.rows)
+    assert [first["amplitude.x"], first["rms.v"]] == pytest.approx([2, 6 / 2**0.5], rel=1e-7)
+    assert abs(first["harmonic.x.1"]) == pytest.approx(2, rel=1e-7)
+    assert first["amplitude.f_z"] is None and second["amplitude.f_z"] > 0
+    single = hs.compare_laws(model, [free], (0, 7), measure="harmonic.x.1")
+    assert single.plot()[1].patches[0].get_width() == pytest.approx(2, rel=1e-7)
+
+
+def test_a_failed_run_and_a_passage_that_never_comes_have_no_bar() -> None:
+    laws = [("coulomb", {"mu": 0.05}), ("coulomb", {"mu": 0.9})]
+    found = hs.compare_laws(block("20*(1 - x)"), laws, (0, 3), measure="first_passage.x>0.9")
+    assert found.rows[0].measured == {"first_passage.x>0.9": None}
+    assert found.rows[1].measured == {"first_passage.x>0.9": inf}
+    _, bars = found.plot()
+    assert [text.get_text().strip() for text in bars.texts] == ["no result", "no result"]
+
+
 @pytest.mark.parametrize(
     ("laws", "options", "message"),
     [
@@ -135,6 +182,10 @@ def test_the_picture_has_a_loop_and_a_bar_for_each_law() -> None:
         (["coulomb"], {"quantity": "y"}, "model block has no quantity 'y'"),
         (["coulomb"], {"rtl": 1}, "'rtl' is not an option"),
         (["coulomb"], {"t_span": (0, 1), "keep": "events"}, "has no option `keep`"),
+        (["coulomb"], {"measure": 3}, "`measure` cannot be 3"),
+        (["coulomb"], {"measure": []}, r"`measure` cannot be \[\]"),
+        (["coulomb"], {"t_span": (0, 1), "measure": "maximum.y"}, "no measure 'maximum.y' of a run"),
+        (["coulomb"], {"t_span": (0, 1), "measure": "2*x"}, "no measure '2\\*x'"),
         (["coulomb"], {"t_eval": [0, 1]}, "has no option `t_eval`"),
         (["coulomb"], {"t_span": (1, 0)}, r"`t_span` cannot be \(1, 0\)"),
     ],
@@ -142,6 +193,13 @@ def test_the_picture_has_a_loop_and_a_bar_for_each_law() -> None:
 def test_what_is_refused(laws: object, options: dict[str, object], message: str) -> None:
     with pytest.raises(hs.HybridsimError, match=message):
         hs.compare_laws(block(), laws, **options)  # type: ignore[arg-type]  # wrong on purpose
+
+
+def test_readings_of_whole_runs_are_refused_for_the_last_period() -> None:
+    for name in ("final.x", "first_passage.x>0", "stops.f"):
+        with pytest.raises(hs.UsageError, match="belongs to a whole run") as caught:
+            hs.compare_laws("dfcs", ["coulomb"], measure=name)
+        assert "amplitude.x" in (caught.value.remedy or "")
 
 
 def test_a_model_with_several_contacts_needs_the_name_of_one() -> None:

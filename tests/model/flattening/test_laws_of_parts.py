@@ -197,6 +197,6 @@ def test_wrong_arguments_of_a_use(folder: Path) -> None:
     with pytest.raises(hs.ModelError, match="the model 'block' has no contact 'brak'"):
         hs.Model("whole", use=[hs.Use("a", block, laws={"brak": "coulomb"})])
     with pytest.raises(
-        hs.ModelError, match="use a, laws: contact a.brake: the law 'coulomb' has no parameter 'nu'"
+        hs.ModelError, match=r"use a, laws: contact a\.brake: the law 'coulomb' has no parameter 'nu'"
     ):
         hs.Model("whole", use=[hs.Use("a", block, laws={"brake": ("coulomb", {"nu": 1})})])
