@@ -200,6 +200,7 @@ HELD = {"kind": {"const": "held"}, "value": said("until it is set from outside",
 POINTS_IN_TIME = {
     "kind": {"const": "table"}, "times": NUMBERS, "values": NUMBERS, "file": CSV,
     "columns": {"type": "array"}, "interpolation": {"enum": ["linear", "cubic", "previous"]}, "unit": UNIT,
+    "time_unit": said("unit of the times, which are converted to seconds", TEXT),
 }  # fmt: skip
 INPUT = {"oneOf": [table(keys, ("kind",)) for keys in (WAVE, CHIRP, POINTS_IN_TIME, HELD, CONNECTED)]}
 OF_ELEMENT = {

@@ -13,10 +13,13 @@ from typing import Any
 import numpy as np
 
 from hybridsim.analysis.fit.unknown import start_of
-from hybridsim.arguments import as_real, cannot_be, finite_number, is_row
+from hybridsim.arguments import as_real, cannot_be, finite_number, is_row, text
 from hybridsim.errors import UsageError, nearest
 from hybridsim.model import Model
 from hybridsim.model.toml.table_file import column_names, read_columns
+from hybridsim.model.units.parse import write_unit
+from hybridsim.model.units.quantities import declared_quantities
+from hybridsim.model.units.seconds import REMEDY, SECOND, in_seconds
 
 
 @dataclass(frozen=True)
@@ -30,13 +33,15 @@ class Record:
         has the name and unit of a quantity of the model. NaN, or an empty cell of a file, marks a missing sample.
         A path names a CSV file whose first line contains the names.
     quantities : mapping of str to str, optional
-        Quantity of the model, or ``t``, by column, if the names differ; other columns are then ignored.
+        Quantity of the model, or ``t``, by column, if the names differ; ``dropped`` then lists the other columns.
     params : mapping of str to str or float, optional
         Parameters that this experiment had, such as the speed of a belt.
     x0 : mapping of str to float, optional
         Start values of this experiment.
     t0 : float, optional
         Time at which the run starts; the default is the first time of the record.
+    time_unit : str, optional
+        Unit of the column ``t``, such as "ms". The times are then converted to seconds.
 
     Examples
     --------
@@ -51,20 +56,22 @@ class Record:
     params: Mapping[str, Any] = field(default_factory=dict)
     x0: Mapping[str, float] = field(default_factory=dict)
     t0: float | None = None
+    time_unit: str | None = None
 
     def __post_init__(self) -> None:
         for name in ("quantities", "params", "x0"):
             value = getattr(self, name)
             if not isinstance(value, Mapping) and (value is not None or name != "quantities"):
                 raise cannot_be(name, value, "use a dict of names, such as {'position': 'x'}")
-        columns = _columns(self.data, self.quantities)
+        columns, dropped = _columns(self.data, self.quantities)
         if "t" not in columns:
             raise UsageError(
-                f"the `data` of the record have no column 't'; the columns are: {', '.join(columns) or 'none'}",
+                f"the `data` of the record have no column 't'; the columns are: "
+                f"{', '.join((*columns, *dropped)) or 'none'}",
                 remedy="name the column of times t, or rename it: quantities={'time': 't'}, "
                 "on the command line --column time=t",
             )
-        t = columns.pop("t")
+        t = self._times(columns.pop("t"))
         if len(t) < 2 or not np.isfinite(t).all() or not (np.diff(t) > 0.0).all():
             raise UsageError(
                 "the times of the record do not increase", remedy="sort the record by time, without repeats"
@@ -76,9 +83,7 @@ class Record:
                 remedy="use an earlier t0",
             )
         if not columns:
-            raise UsageError(
-                "the record has times but no measured quantity", remedy="add a column for each quantity"
-            )
+            raise _nothing_measured(dropped)
         for name, values in columns.items():
             if len(values) != len(t):
                 raise UsageError(
@@ -89,14 +94,35 @@ class Record:
                 raise UsageError(
                     f"column {name!r} contains an infinite value", remedy="use NaN for a missing value"
                 )
-        for name, value in (("t", t), ("t0", start), ("columns", columns)):
+        for name, value in (("t", t), ("t0", start), ("columns", columns), ("dropped", dropped)):
             object.__setattr__(self, name, value)
 
     t: np.ndarray = field(init=False, repr=False)
     columns: dict[str, np.ndarray] = field(init=False, repr=False)
+    dropped: tuple[str, ...] = field(init=False, repr=False)
+
+    def __repr__(self) -> str:
+        names = f"t = {self.t[0]:g} to {self.t[-1]:g}; {', '.join(self.columns)}"
+        dropped = f"; dropped: {', '.join(self.dropped)}" if self.dropped else ""
+        return f"<Record: {len(self.t)} times, {names}{dropped}>"
+
+    def _times(self, column: np.ndarray) -> np.ndarray:
+        if self.time_unit is None:
+            return column
+        unit = text(self.time_unit, "time_unit")
+        times = in_seconds(column.tolist(), unit)
+        if times is None:
+            raise cannot_be("time_unit", unit, REMEDY)
+        return np.array(times)
 
     def require_quantities(self, model: Model, known: tuple[str, ...]) -> None:
-        """Raise an error for a column that is not a quantity of the model."""
+        """Raise an error for a column that is not a quantity of the model, and for times in another unit."""
+        units = declared_quantities(model) if self.time_unit is not None else None
+        if units is not None and units.time is not None and units.time.differs(SECOND):
+            raise UsageError(
+                f"`time_unit` gives times in s, but the time of model {model.name} is in {write_unit(units.time)}",
+                remedy="remove `time_unit`, and use times in the unit of the model",
+            )
         for name in self.columns:
             if name not in known:
                 raise UsageError(
@@ -128,8 +154,23 @@ def refuse_unknowns_of_records(records: tuple[Record, ...], unknowns: Iterable[s
                 )
 
 
-def _columns(data: Any, quantities: Mapping[str, str] | None) -> dict[str, np.ndarray]:
-    """Return the times and the columns by quantity; `quantities` selects and renames columns."""
+def _nothing_measured(dropped: tuple[str, ...]) -> UsageError:
+    """Return the error for a record without a quantity; `dropped` are the columns that `quantities` leaves out."""
+    if not dropped:
+        return UsageError(
+            "the record has times but no measured quantity", remedy="add a column for each quantity"
+        )
+    return UsageError(
+        f"`quantities` selects no measured quantity, and drops the columns {', '.join(dropped)}",
+        remedy=f"add the measured columns, such as quantities={{{dropped[0]!r}: QUANTITY}}, "
+        f"on the command line --column {dropped[0]}=QUANTITY",
+    )
+
+
+def _columns(
+    data: Any, quantities: Mapping[str, str] | None
+) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:
+    """Return the times and the columns by quantity, and the columns that `quantities` does not select."""
     is_file = isinstance(data, str | PathLike)
     if not is_file and not (hasattr(data, "keys") and hasattr(data, "__getitem__")):
         raise cannot_be("data", data, "use a dict of columns, a DataFrame or the path of a CSV file")
@@ -152,11 +193,12 @@ def _columns(data: Any, quantities: Mapping[str, str] | None) -> dict[str, np.nd
     ordered = sorted(chosen, key=lambda name: str(chosen[name]) != "t")
     if is_file:
         if "t" not in chosen.values():
-            return dict.fromkeys(map(str, names), np.empty(0))
+            return dict.fromkeys(map(str, names), np.empty(0)), ()
         values = [np.array(column) for column in read_columns(Path(data), ordered, may_lack=True)]
     else:
         values = [_numbers(data[name], str(name)) for name in ordered]
-    return {str(chosen[name]): column for name, column in zip(ordered, values, strict=True)}
+    dropped = tuple(str(name) for name in names if name not in chosen)
+    return {str(chosen[name]): column for name, column in zip(ordered, values, strict=True)}, dropped
 
 
 def _numbers(column: Any, name: str) -> np.ndarray:

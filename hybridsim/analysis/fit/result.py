@@ -179,6 +179,11 @@ class Fit(Readable):
             "warnings": list(self.warnings),
         }
 
+    def _dropped(self) -> list[str]:
+        """Return a line about the columns of the records that were not fitted."""
+        names = dict.fromkeys(name for record in self.records for name in record.dropped)
+        return [f"  columns not used: {', '.join(names)}"] if names else []
+
     def __repr__(self) -> str:
         units = {p.name: p.unit for p in self.model.parameters}
         units |= {start_of(s.name): s.unit for s in self.model.states}
@@ -209,6 +214,7 @@ class Fit(Readable):
                 f"  root mean square of the residuals: {noise}",
                 *([] if self.success else [f"  not converged: {self.message}"]),
                 *(f"  undetermined: {text}" for text in self.undetermined),
+                *self._dropped(),
                 *(f"  warning: {text}" for text in self.warnings),
             ]
         )

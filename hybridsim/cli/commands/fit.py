@@ -47,6 +47,11 @@ def add_to(commands: Any) -> None:
         "COLUMN=QUANTITY",
         "the quantity of the model in a column with another name; other columns are then ignored",
     )
+    parser.add_argument(
+        "--time-unit",
+        metavar="UNIT",
+        help="unit of the column t, such as ms; the times are converted to seconds",
+    )
     options.add_repeated(
         parser,
         "--noise",
@@ -70,7 +75,7 @@ def execute(args: argparse.Namespace, session: Session) -> int:
     options.check_plot(args)
     model = values.changed_model(args)
     quantities = dict(args.column) or None
-    records = [hybridsim.Record(path, quantities) for path in args.data]
+    records = [hybridsim.Record(path, quantities, time_unit=args.time_unit) for path in args.data]
     more = {} if args.rtol is None else {"rtol": args.rtol}
     with Progress(session) as progress:
         found = hybridsim.fit(

@@ -14,6 +14,7 @@ from hybridsim.files import path_text
 from hybridsim.model.parts.declared import Declared
 from hybridsim.model.parts.quantities import Discrete
 from hybridsim.model.toml.table_file import read_columns
+from hybridsim.model.units.seconds import REMEDY, in_seconds
 
 KINDS = ("table", "wave", "chirp", "held", "connected")
 SHAPES = ("square", "triangle", "sawtooth", "sine")
@@ -27,7 +28,7 @@ REQUIRED = {
     "connected": (),
 }
 OPTIONAL = {
-    "table": ("interpolation", "unit"),
+    "table": ("interpolation", "unit", "time_unit"),
     "wave": ("amplitude", "phase", "offset", "duty", "unit"),
     "chirp": ("amplitude", "phase", "unit"),
     "held": ("value", "unit"),
@@ -83,6 +84,9 @@ class Input(Declared):
         once; the input contains the numbers.
     columns : pair of str or int, optional
         Names or indices of the columns of ``file`` with time and value; the first two by default.
+    time_unit : str, optional
+        Unit of the times of a table, such as "ms". They are converted to seconds, and the input then has ``"s"``. By
+        default times have the unit of the model's time.
     place : Place, optional
         Place of the declaration, for error messages.
 
@@ -111,9 +115,10 @@ class Input(Declared):
     unit: str | None = None
     file: str | PathLike[str] | None = None
     columns: Sequence[str | int] | None = None
+    time_unit: str | None = None
 
     def __post_init__(self) -> None:
-        self._texts("name", "kind", "interpolation", "shape", "unit")
+        self._texts("name", "kind", "interpolation", "shape", "unit", "time_unit")
         if self.file is not None:
             self._read_file()
         elif self.columns is not None:
@@ -126,8 +131,17 @@ class Input(Declared):
                 object.__setattr__(self, name, value)
         self._expressions("amplitude", "period", "phase", "offset", "duty", "f0", "f1", "duration", "value")
         self._numbers("times", "values")
+        if self.time_unit is not None:
+            self._convert_times(self.time_unit)
         if self.interpolation == "previous":
             self._write_steps()
+
+    def _convert_times(self, unit: str) -> None:
+        times = in_seconds(self.times, unit)
+        if times is None:
+            raise self._fault(f"`time_unit` cannot be {unit!r}", REMEDY)
+        object.__setattr__(self, "times", times)
+        object.__setattr__(self, "time_unit", "s")
 
     def _write_steps(self) -> None:
         """Convert a piecewise constant table to a linear table with jumps; the checks report an invalid table."""

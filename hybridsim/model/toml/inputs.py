@@ -9,8 +9,9 @@ from typing import Any
 from hybridsim.model.parts.inputs import KINDS, OPTIONAL, REQUIRED, Input
 from hybridsim.model.toml.table import Table
 from hybridsim.model.toml.table_file import numbers_from_file
+from hybridsim.model.units.seconds import REMEDY, in_seconds
 
-_TEXTS = ("shape", "interpolation", "unit")
+_TEXTS = ("shape", "interpolation", "unit", "time_unit")
 _NUMBERS = ("times", "values")
 
 
@@ -27,6 +28,10 @@ def read_inputs(root: Table, folder: Path) -> Iterable[Input]:
                 table.require(key, f"an input of kind '{kind}' needs {', '.join(REQUIRED[kind])}")
             numbers = {key: _numbers(table, key) for key in _NUMBERS if key in table.data}
         texts = {key: table.text(key) for key in _TEXTS if key in table.data}
+        if in_seconds((), texts.get("time_unit", "s")) is None:
+            wrong = texts.pop("time_unit")
+            if table.data["time_unit"] == wrong:  # another type is reported already
+                table.fail(f"'time_unit' cannot be '{wrong}'", REMEDY, "time_unit")
         rest = [key for key in known if key not in (*_TEXTS, *_NUMBERS) and key in table.data]
         expressions = {key: table.expression(key) for key in rest}
         fields: dict[str, Any] = {**numbers, **texts, **expressions}

@@ -83,7 +83,7 @@ def _short(key: str, entries: dict[str, dict[str, Any]]) -> dict[str, Any]:
 
 
 def _input(signal: Input) -> dict[str, Any]:
-    fields = ("kind", "times", "values", "interpolation", "shape", "unit")
+    fields = ("kind", "times", "values", "interpolation", "shape", "unit", "time_unit")
     return {**_fields(signal, *fields), **signal.expressions}
 
 

@@ -13,6 +13,7 @@ from hybridsim.model.parts.model import Model
 from hybridsim.model.units.infer import Disagreement
 from hybridsim.model.units.parse import write_unit
 from hybridsim.model.units.quantities import Quantities
+from hybridsim.model.units.seconds import SECOND
 from hybridsim.model.units.statements import Statement, statements_of
 from hybridsim.model.units.unit import Unit
 from hybridsim.model.units.votes import quantities_of
@@ -37,8 +38,20 @@ def unit_faults(model: Model) -> Iterator[Caution]:
     """Yield a warning for each expression of a model in which two known units disagree."""
     known = quantities_of(model)
     if known is not None:
+        yield from _times_of_inputs(model, known)
         for expression in units_of_expressions(model, known):
             yield from expression.cautions
+
+
+def _times_of_inputs(model: Model, known: Quantities) -> Iterator[Caution]:
+    """Yield a warning for each input whose times were converted to seconds, if t has another unit."""
+    if known.time is not None and known.time.differs(SECOND):
+        for signal in model.inputs:
+            if signal.time_unit is not None:
+                message = f"{signal.subject}: its times are in s, but t is in {write_unit(known.time, known.labels)}"
+                yield Caution(
+                    message, signal.place, "remove 'time_unit', and write the times in the unit of t"
+                )
 
 
 def units_of_expressions(model: Model, known: Quantities) -> Iterator[UnitOfExpression]:

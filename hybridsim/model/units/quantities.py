@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from fractions import Fraction
 
 from hybridsim.expr.grammar import TIME
 from hybridsim.model.laws.law_with_states import ContactState
@@ -12,9 +11,9 @@ from hybridsim.model.parts.model import Model
 from hybridsim.model.parts.quantities import Discrete, Parameter, State
 from hybridsim.model.units.infer import Inference
 from hybridsim.model.units.parse import read_unit
+from hybridsim.model.units.seconds import SECOND
 from hybridsim.model.units.unit import ONE, Unit, most_frequent
 
-_SECOND = Unit((("s", Fraction(1)),))
 _TIMES = ("s", "ms", "us", "µs", "min", "h", "d")
 
 
@@ -85,10 +84,10 @@ def _time_of(model: Model, known: Quantities) -> Unit | None:
             votes.append((known.units[state.name] / rate).without_angles())
     for text in known.texts.values():
         votes += [unit for symbol in _TIMES if _contains(text, symbol) and (unit := read_unit(symbol))]
-    votes = [unit for unit in votes if unit.dimension == _SECOND.dimension]
+    votes = [unit for unit in votes if unit.dimension == SECOND.dimension]
     if any("s" in dict(unit.powers) for unit in known.units.values()):
-        votes.append(_SECOND)  # as in N
-    votes.sort(key=lambda unit: bool(unit.differs(_SECOND)))  # of equally many, s
+        votes.append(SECOND)  # as in N
+    votes.sort(key=lambda unit: bool(unit.differs(SECOND)))  # of equally many, s
     return most_frequent(votes) if votes else None
 
 

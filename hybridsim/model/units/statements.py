@@ -15,11 +15,12 @@ from hybridsim.model.parts.inputs import Input
 from hybridsim.model.parts.model import Model
 from hybridsim.model.units.parse import read_unit
 from hybridsim.model.units.quantities import Quantities
+from hybridsim.model.units.seconds import SECOND
 from hybridsim.model.units.unit import ONE, TURN, Unit
 
 _TURN = Unit(((TURN, Fraction(1)),))
-_METRE, _SECOND = Unit((("m", Fraction(1)),)), Unit((("s", Fraction(1)),))
-_LENGTHS, _SPEEDS = (_METRE, ONE), (_METRE / _SECOND, ONE / _SECOND)  # the second ones are those of angles
+_METRE = Unit((("m", Fraction(1)),))
+_LENGTHS, _SPEEDS = (_METRE, ONE), (_METRE / SECOND, ONE / SECOND)  # the second ones are those of angles
 
 
 @dataclass(frozen=True)

@@ -225,6 +225,47 @@ def test_the_time_has_a_name_of_its_own(tmp_path: Path) -> None:
     assert "place" in str(caught.value.remedy)
 
 
+def test_columns_that_are_dropped_are_named(tmp_path: Path) -> None:
+    t = np.linspace(0.0, 2.0, 30)
+    data = {"t": t, "place": 1 + 0.3 * t, "force": t, "note": ["a"] * 30}
+    record = hs.Record(data, {"place": "x"})
+    assert record.dropped == ("force", "note")
+    assert repr(record) == "<Record: 30 times, t = 0 to 2; x; dropped: force, note>"
+    assert "columns not used: force, note" in repr(hs.fit(LINE, record, {"a": (0, 1)}))
+    whole = hs.Record({"t": t, "x": 1 + 0.3 * t})
+    assert whole.dropped == () and "not used" not in repr(hs.fit(LINE, whole, {"a": (0, 1)}))
+    path = tmp_path / "record.csv"
+    path.write_text("time,place,force\n0,1,2\n1,2,3\n", encoding="utf-8")
+    with pytest.raises(
+        hs.UsageError, match="selects no measured quantity, and drops the columns place, force"
+    ) as caught:
+        hs.Record(path, {"time": "t"})
+    assert "quantities={'place': QUANTITY}" in (caught.value.remedy or "")
+    with pytest.raises(hs.UsageError, match="no column 't'; the columns are: x, time"):
+        hs.Record({"time": t, "place": t}, {"place": "x"})
+
+
+def test_times_in_milliseconds(tmp_path: Path) -> None:
+    """A block with v = 1 - a*t: of times in ms the unknown deceleration would be 1e-3 as large."""
+    path = tmp_path / "record.csv"
+    path.write_text(
+        "t,x\n" + "".join(f"{k},{1 + 0.3 * k / 1000!r}\n" for k in range(0, 2001, 50)), encoding="utf-8"
+    )
+    record = hs.Record(path, time_unit="ms")
+    assert record.t.tolist() == [k / 1000 for k in range(0, 2001, 50)]  # the doubles next to the decimals
+    assert hs.fit(LINE, record, {"a": (0, 1)}).values["a"] == pytest.approx(0.3, abs=1e-8)
+    hours = hs.Record({"t": [0, 0.5], "x": [1, 2]}, time_unit="h")
+    assert hours.t.tolist() == [0.0, 1800.0]
+    for unit in ("mm", "second", "", 3):
+        with pytest.raises(hs.UsageError, match="`time_unit` cannot be"):
+            hs.Record(path, time_unit=unit)  # type: ignore[arg-type]
+    slow = hs.Model(
+        "slow", states=[hs.State("x", 1, "a", unit="m")], parameters=[hs.Parameter("a", 0.3, unit="m/h")]
+    )
+    with pytest.raises(hs.UsageError, match="the time of model slow is in h"):
+        hs.fit(slow, record, {"a": (0, 1)})
+
+
 BLOCK = """
 schema = 1
 name = "sliding-block"

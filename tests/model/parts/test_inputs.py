@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 import hybridsim as hs
+from hybridsim.model.checks.doubtful import warnings_of
 
 HEAD = '[states]\nx = { start = 0, der = "u" }\n[inputs.u]\n'
 
@@ -145,6 +146,7 @@ def test_bad_tables(more: str, table: str | bytes | None, message: str, tmp_path
         ("", "'kind' is missing"),
         ('kind = "waves"', "did you mean 'wave'"),
         ('kind = "wave"\nperiod = 1', "'shape' is missing"),
+        ('kind = "table"\ntimes = [0, 1]\nvalues = [0, 1]\ntime_unit = ""', "'time_unit' cannot be ''"),
         ('kind = "wave"\nshape = "square"', "'period' is missing"),
         ('kind = "wave"\nshape = "sinus"\nperiod = 1', "unknown shape 'sinus'"),
         ('kind = "wave"\nshape = "sine"\nperiod = 0', "'period' cannot be 0"),
@@ -254,3 +256,52 @@ def test_a_table_that_holds_its_values_needs_increasing_times(times: list, messa
     held = hs.Input("u", "table", times=times, values=[2, -1, 4], interpolation="previous")
     with pytest.raises(hs.ModelError, match=message):
         hs.Model("m", states=[hs.State("x", 0, "u - x")], inputs=[held]).validate()
+
+
+def test_times_of_a_table_in_milliseconds(tmp_path: Path) -> None:
+    """The integral over 2 s of a table that rises from 0 to 6 is 6; with the times as seconds it would be 6e-3."""
+    model = load(tmp_path, TABLE + 'time_unit = "ms"', "0,0\n999,2.997\n2000,6\n")
+    signal = model.inputs[0]
+    assert (signal.times, signal.time_unit) == ((0.0, 0.999, 2.0), "s")
+    assert hs.Model.from_toml(model.to_toml()) == model
+    assert hs.simulate(model, (0, 2), integrator="taylor").y[0, -1] == pytest.approx(6, rel=1e-12)
+    same = hs.Input("u", "table", file=tmp_path / "road.csv", time_unit="ms")
+    assert same == signal
+    steps = hs.Input("u", "table", times=[0, 1], values=[1, 2], interpolation="previous", time_unit="min")
+    assert steps.times == (0.0, 60.0, 60.0)
+
+
+@pytest.mark.parametrize(
+    ("declaration", "message"),
+    [
+        ('kind = "table"\ntimes = [0, 1]\nvalues = [0, 1]\ntime_unit = "mm"', "'time_unit' cannot be 'mm'"),
+        (
+            'kind = "table"\ntimes = [0, 1]\nvalues = [0, 1]\ntime_unit = 3',
+            "'time_unit' cannot be a number (3)",
+        ),
+        ('kind = "wave"\nshape = "sine"\nperiod = 1\ntime_unit = "ms"', "unknown key 'time_unit'"),
+    ],
+)
+def test_wrong_units_of_times(declaration: str, message: str, tmp_path: Path) -> None:
+    with pytest.raises(hs.ModelError) as caught:
+        load(tmp_path, declaration)
+    assert message in str(caught.value)
+    assert caught.value.place is not None and caught.value.place.line is not None
+
+
+def test_wrong_units_of_times_in_python() -> None:
+    with pytest.raises(hs.UsageError, match="`time_unit` cannot be 'mm'"):
+        hs.Input("u", "table", times=[0, 1], values=[0, 1], time_unit="mm")
+    wave = hs.Input("u", "wave", shape="sine", period=1, time_unit="ms")
+    with pytest.raises(hs.ModelError, match="input u of kind wave cannot have 'time_unit'"):
+        hs.Model("m", states=[hs.State("x", 0, "u")], inputs=[wave]).validate()
+
+
+def test_a_model_in_another_unit_of_time_is_warned_of(tmp_path: Path) -> None:
+    table = 'kind = "table"\ntimes = [0, 60]\nvalues = [0, 1]\nunit = "m/h"\ntime_unit = "min"\n'
+    for unit, count in (("h", 1), ("s", 0)):
+        text = HEAD.replace("start = 0", 'start = 0, unit = "m"') + table.replace("m/h", f"m/{unit}")
+        found = warnings_of(hs.Model.from_toml(text))
+        assert [("its times are in s, but t is in h" in caution.message) for caution in found] == [
+            True
+        ] * count
