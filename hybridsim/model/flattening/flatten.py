@@ -239,9 +239,8 @@ def _of_copy(values: tuple[Value, ...], number: int | None) -> Value:
 
 def _of_contact(name: str, part: Model, contacts: Collection[str]) -> bool:
     """Return whether a name can be that of a state of the law of one of some contacts of a part."""
-    if any(
-        name == state.name and not isinstance(state, ContactState) for state in (*part.states, *part.discrete)
-    ):
+    own = [state.name for state in part.states if not isinstance(state, ContactState)]
+    if name in own or name in [state.name for state in part.discrete]:
         return False
     owners = [contact for contact in part.contacts if name.startswith(contact.variable(""))]
     return bool(owners) and max(owners, key=lambda contact: len(contact.name)).name in contacts
