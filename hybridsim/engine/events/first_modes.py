@@ -55,7 +55,7 @@ def as_read_by_conditions(system: System, at: Situation, jumped: bool = False) -
 
 
 def certainly_leaving(resolution: EventData) -> set[int]:
-    """Return the automata with a guard that becomes negative in every mode of the surfaces at zero.
+    """Return the components that leave their modes whichever modes the surfaces at zero take.
 
     The sides of their guards are set accordingly. If these surfaces have too many combinations of modes, only values of
     guards without forces are used.

@@ -198,7 +198,7 @@ class EventResolution(ClusterChoice):
         return None
 
     def _place(self, component: int) -> int:
-        """Return the position of a component's first guard in the time order of the guards."""
+        """Return the rank of a component by the time at which its first guard became zero."""
         numbers = self.system.automata[component].guards[self.at.z[component]]
         return min((self.rank.get(g, len(self.rank)) for g in numbers), default=len(self.rank))
 
@@ -231,7 +231,7 @@ class EventResolution(ClusterChoice):
         status: str,
         message: str,
     ) -> Outcome:
-        """Return the present state as the outcome; `monitors` are the sides and orders of the monitors."""
+        """Return the present state with the sides and orders of guards and monitors, as an outcome."""
         at = self.at
         return Outcome(
             at.x, at.p, at.z, self.sides, self.orders, *monitors, at.x_error, floors, monitor_floors,

@@ -40,7 +40,7 @@ class DividesByZero(NotLinear):
 
 @dataclass(frozen=True)
 class Atom:
-    """A basic function of time: local time, a constant, or an angle or exponent that is linear in time."""
+    """A basic function of time: local time, a constant, or a function whose angle or exponent is linear in time."""
 
     kind: int
     rate: float
@@ -125,7 +125,7 @@ class LinearReader:
                 self.forms[register] = math.nan if p is None else p[source]
 
     def read(self, rows: Iterable[tuple[int, ...]]) -> None:
-        """Process instructions of the tape. If a result is nonlinear, store the reason."""
+        """Convert instructions of a tape to linear forms; store the reason if a result is nonlinear."""
         for op, a, b, c, out in rows:
             if op == ops.COPY:
                 self.forms[out] = self.forms[a]
@@ -177,7 +177,7 @@ class LinearReader:
         raise NotLinear(_IN_THE_WAY.get(op, _OTHER))
 
     def _of_form(self, op: int, form: Form) -> tuple[Read, ...]:
-        """Apply an operation to one operand that is a linear form and not a number."""
+        """Apply an operation to one linear form that is not constant."""
         if op == ops.NEG:
             return ({key: -weight for key, weight in form.items()},)
         if op == ops.SINCOS:

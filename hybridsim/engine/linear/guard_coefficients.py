@@ -44,7 +44,7 @@ def has_tables(lin: Any) -> bool:
 
 @inlined
 def measure_point(lin: Any, work: Any) -> None:
-    """Store the sizes of the states and functions of time, which bound rounding errors of coefficients."""
+    """Store bounds of the states and of the functions of time, from which rounding errors are estimated."""
     if not has_tables(lin):
         return
     size = 0.0

@@ -90,7 +90,7 @@ def _bend(lin: Any, k: int, i: int, v: Any, is_shrinking: bool) -> tuple[float, 
 
 @inlined
 def _is_shrinking(lin: Any, k: int) -> bool:
-    """Return whether bounds from the modal coordinates stay valid, because no coordinate grows."""
+    """Return whether no modal coordinate grows, so that bounds at the start stay valid."""
     for j in range(lin.counts[k]):
         if lin.values[k, j].real > 0.0:
             return False

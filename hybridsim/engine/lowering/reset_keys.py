@@ -14,7 +14,7 @@ def added(key: tuple[Any, ...]) -> tuple[Any, ...]:
 
 
 def is_added(key: tuple[Any, ...]) -> bool:
-    """Return whether a key denotes amounts to add instead of new values."""
+    """Return whether a key stands for additive resets, which add an amount to a variable."""
     return bool(key[0] == "added")
 
 

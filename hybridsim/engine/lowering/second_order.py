@@ -21,7 +21,7 @@ from hybridsim.model.parts.switching import ATTRACTION
 
 @dataclass(frozen=True)
 class Partner:
-    """The relay whose surface is the rate of another relay's function, du/dt = factor * w.
+    """A relay whose surface w is proportional to the rate of another relay's function u: du/dt = factor * w.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ class Partner:
     factor: Any
 
     def share(self, c: int, d: int, sp: Any) -> Any:
-        """Return a matrix entry of the condition that relay `c` and its partner slide with equal weights."""
+        """Return a coefficient of the condition that relay `c` and its partner slide with equal weights."""
         if d == c:
             return sp.Integer(1)
         return -sp.sign(self.factor) if d == self.component else sp.Integer(0)
@@ -67,7 +67,7 @@ def partners(
 
 
 def attraction(lowering: LoweringState, c: int, partner: Partner, effect: dict[tuple[int, int], Any]) -> Item:
-    """Return the item that computes the attraction of relay `c` by the second derivative while its partner is held."""
+    """Return a program item for the attraction of relay `c` while its partner is held."""
     sp, other = lowering.sp, lowering.components[partner.component]
     name = user(ATTRACTION + lowering.components[c].surface.unknown)
     pull = -partner.factor * effect[partner.component, c]

@@ -160,12 +160,12 @@ def store(path: Path | None, content: bytes) -> bool:
 
 
 def store_whole(path: Path | None, content: bytes) -> bool:
-    """Write content together with its digest, for `load_whole`."""
+    """Write content together with its checksum, for `load_whole`."""
     return store(path, hashlib.sha256(content).digest() + content)
 
 
 def load_whole(path: Path | None) -> bytes | None:
-    """Return the content written by `store_whole`, or None if it is missing, damaged or not private."""
+    """Return the content that `store_whole` wrote, or None if it is missing, damaged or writable by others."""
     if path is None or not is_trusted_file(path):
         return None
     try:
@@ -177,7 +177,7 @@ def load_whole(path: Path | None) -> bytes | None:
 
 
 def _made_by_us(root: Path) -> tuple[list[Path], list[Path]]:
-    """Return the folders of compiled code that have hybridsim's mark, and similarly named folders without the mark."""
+    """Return the cache folders of compiled code that hybridsim has marked as its own, and unmarked ones."""
     ours, others = [], []
     for entry in sorted(root.glob("engine-*")):
         is_folder = entry.is_dir() and not entry.is_symlink()

@@ -48,7 +48,7 @@ class Lines:
             raise TooLong
 
     def value(self, form: str, *parts: str) -> str:
-        """Return the result of a line; an equal earlier line is reused."""
+        """Write a line of code and return the name of its result; an equal line is written only once."""
         key = (form, *parts)
         if key not in self._known:
             name = f"%{self._prefix}{len(self._known)}"

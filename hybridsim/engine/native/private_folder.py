@@ -79,7 +79,7 @@ def _has_trusted_owner(found: os.stat_result) -> bool:
 
 
 def _unmapped() -> int | None:
-    """Return the user number that stands for all unmapped users in this namespace, or None."""
+    """Return the user number for users that are unknown in this container, or None if all users are known."""
     try:
         with open("/proc/self/uid_map") as mapped, open("/proc/sys/kernel/overflowuid") as number:
             knows_all = mapped.read().split() == ["0", "0", "4294967295"]

@@ -17,7 +17,7 @@ Form = tuple[type, tuple[int | str, ...]]  # type of an array, and its lengths; 
 def check_forms(
     title: str, arrays: Arrays, forms: Mapping[str, Form], sizes: Mapping[str, int]
 ) -> dict[str, int]:
-    """Check the types and lengths of arrays, and return all sizes by symbol.
+    """Check the types and lengths of arrays, and return the sizes that their shapes imply.
 
     Raises
     ------

@@ -76,7 +76,7 @@ class StepSegments(SegmentBlock):
         self.modes = z[self._first]
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """Return all arrays of the block by name, for `of_arrays`."""
+        """Return all arrays of the block by name, as `of_arrays` reads them."""
         used = slice(int(self._first[0]), int(self._last[-1]) + 1)
         rows = {"s": self._s[used], "x": self._x[used], "z": self._z[used]}
         return rows | {

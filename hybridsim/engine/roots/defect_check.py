@@ -93,7 +93,7 @@ def look_ahead(
     code: int, rows: Any, flow_registers: Any, order: int, s: float, d: float, guard_registers: Any, series: Any,
     U: Any, W: Any, ahead: Any,
 ) -> None:  # fmt: skip
-    """Fill the array `ahead` for a distance from the start of the Taylor series of states and guards.
+    """Evaluate Taylor series of states and guards at a distance from their origin, to check their accuracy.
 
     code: address of a function that does the same; 0 for none. W: the registers of the tape with its
     constants.

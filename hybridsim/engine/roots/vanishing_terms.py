@@ -178,7 +178,7 @@ def _changes(b: Any) -> tuple[int, bool]:
 
 @inlined
 def _extremum(u: Any, order: int, near: float, far: float, rises: bool) -> float:
-    """Find the sign change of the slope of u between two points, by Newton's method with bisection."""
+    """Find the extremum of a polynomial u between two points, by Newton's method with bisection."""
     d = 0.5 * (near + far)
     for _ in range(_POLISHED):
         slope, bend = 0.0, 0.0
@@ -202,7 +202,7 @@ def _extremum(u: Any, order: int, near: float, far: float, rises: bool) -> float
 
 @kernel
 def _becomes_near(u: Any, order: int, sign: float, high: float, low: float, far: float, near: float) -> float:
-    """Find a point at which |u| is between two bounds, by bisection."""
+    """Find a point at which the absolute value of a polynomial u lies between two bounds, by bisection."""
     d = near
     for _ in range(_HALVED):
         d = 0.5 * (far + near)

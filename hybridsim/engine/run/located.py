@@ -88,7 +88,7 @@ class Located:
     waiting: frozenset[int] = frozenset()
 
     def scope(self, system: System) -> set[int]:
-        """Return the components whose modes are chosen before schedules are applied."""
+        """Return the components that take part in the event before schedules are applied."""
         return set(range(len(system.automata))) - self.waiting
 
     def is_event(self, system: System) -> bool:
@@ -189,7 +189,7 @@ def as_stepped(system: System, at: Situation, arrival: Arrival, segment: Segment
 def _as_due(
     system: System, origin: Instant, at: Situation, series: Any, arrival: Arrival, known_at: float
 ) -> tuple[Situation, Any]:
-    """Return the state at a scheduled time, with the wider error bounds if these contain more zeros."""
+    """Return the state at a scheduled time, with wider error bounds if more functions are zero within these bounds."""
     slopes = np.abs(system.flow(at.s, at.x, at.p, at.z)) if system.n else 0.0
     wide = replace(at, x_error=at.x_error + known_at * slopes, s_error=at.s_error + known_at)
     known = system.series(wide.s, wide.x, wide.p, wide.z, wide.x_error, wide.s_error)
@@ -198,7 +198,7 @@ def _as_due(
 
 
 def others_near(system: System, at: Situation, series: Any, arrival: Arrival, share: float) -> bool:
-    """Return whether another function may be zero within its error bound, multiplied by `share`."""
+    """Return whether another guard or monitor is smaller than `share` times its error bound."""
     active = set(map(int, np.flatnonzero(system.active(at.z) & ~system.is_corner[system.owner])))
     monitors = set(range(len(series.monitors))) - set(arrival.stopping)
     values = [(series.guards[g][0], series.guard_bounds[g][0]) for g in active.difference(arrival.fired)]

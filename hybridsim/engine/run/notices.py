@@ -219,7 +219,7 @@ def fastest_decay(flow: Any, s: float, x: Any, p: Any, z: Any, floors: Any, work
 
 
 def _last_transitions(blocks: Sequence[Any], count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return instants (k, 2) and states (k, 2, n) on both sides of the transitions in the last events."""
+    """Return the instants (k, 2) and the states (k, 2, n) before and after each of the last transitions."""
     parts, missing = [], count
     for block in reversed(blocks):
         first = max(0, len(block) - missing)
@@ -248,7 +248,7 @@ def _last(blocks: Sequence[Any], count: int) -> list[Occurrence]:
 
 
 def _sampled(block: Any) -> list[Sample]:
-    """Return steps of evenly spaced segments, except their last steps and the first steps of long segments."""
+    """Return sampled steps of evenly spaced segments; last steps of segments are not sampled."""
     chosen = _evenly(len(block), _LOOKS)
     share = -(-_LOOKS // len(chosen))
     found: list[Sample] = []

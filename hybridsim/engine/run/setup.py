@@ -25,7 +25,7 @@ _RENEWAL_TURNS = 100
 
 
 class LazyState:
-    """The outcome of the last event and the run-time vector, both computed on demand.
+    """The state after the last event, and its run-time values; both are computed on demand.
 
     Parameters
     ----------

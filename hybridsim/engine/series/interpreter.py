@@ -201,7 +201,7 @@ def _logic(op: int, V: Any, a: int, b: int, c: int, out: int, k: int) -> None:
 
 @inlined
 def _factor(flags: int, V: Any, b: int, c: int) -> float:
-    """Combine two constants into a factor, according to flags of an operation."""
+    """Compute a factor from up to two constants, each of which multiplies or divides."""
     f = 1.0
     if flags & HAS_B:
         f = 1.0 / V[b, 0] if flags & OVER_B else V[b, 0]
@@ -319,7 +319,7 @@ def sum_sizes(U: Any, r: int, order: int, powers: Any) -> float:
 
 @inlined
 def measure(code: int, U: Any, monitored: Any, order: int, h: float, powers: Any, totals: Any) -> None:
-    """Compute the powers of h, and the sums of `sum_sizes` for the monitored rows of U.
+    """Compute the powers of h, and bounds of the Taylor sums of the monitored rows of U.
 
     code: address of a function that does so for all rows, with the totals after the powers in memory (`sizes`
     of `hybridsim.engine.series.emit_series`); 0 for none.

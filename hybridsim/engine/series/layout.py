@@ -34,7 +34,7 @@ class Layout:
 
     @cached_property
     def pin_at(self) -> int:
-        """Return the offset of a flag: 1 if held states follow from constraints, 0 if they are integrated."""
+        """Return the offset of the flag that says whether held states are computed from constraints."""
         return self.origin_at + 1
 
     @cached_property

@@ -34,7 +34,7 @@ def written(value: Any) -> str:
 
 
 def _compared(kind: str) -> Any:
-    """Return the method of `Value` for a comparison of LLVM."""
+    """Return a method that compares two symbolic values, for use in class `Value`."""
     return lambda value, other: _Condition(kind, value, other)
 
 
@@ -174,7 +174,7 @@ class Trace(Lines):
     def on_all_paths(
         self, step: Callable[..., Any], row: Any, tables: tuple[Coefficients, ...], k: int
     ) -> None:
-        """Run a kernel for one row on all paths of its conditions; emit code that selects one of the results."""
+        """Run a kernel on all paths of its conditions, and emit code that selects the result of the valid path."""
         for table, new in zip(tables, self._results(step, row, tables, k, ()), strict=True):
             table.new = table.known
             table.known.update(new)
@@ -182,7 +182,7 @@ class Trace(Lines):
     def _results(
         self, step: Any, row: Any, tables: tuple[Coefficients, ...], k: int, path: tuple[bool, ...]
     ) -> list[dict[tuple[int, int], Any]]:
-        """Return the results that the kernel writes to each table after the conditions of one path."""
+        """Return the results that a kernel writes to each table on one path of its conditions."""
         self._truths = list(path)
         for table in tables:
             table.new = {}

@@ -1,4 +1,4 @@
-"""This module encodes functions that may vanish in a Taylor series although they change later."""
+"""This module encodes functions whose leading Taylor coefficients may be zero although they change later."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ MAX_POWER = 64  # largest power that is distinguished
 
 @inlined
 def register_of(number: int) -> int:
-    """Return the register from the code of a function that may vanish."""
+    """Return the register number that the code of a vanishing function contains."""
     return number // (KINDS * MAX_POWER)
 
 

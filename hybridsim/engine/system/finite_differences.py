@@ -42,7 +42,7 @@ _SMALLEST = 2.0**-40  # shift of a state of unknown size
 
 @kernel
 def _at(function: Any, s: float, moving: float, C: Any, h: float, p: Any, z: Any, x: Any, out: Any) -> None:
-    """Evaluate a function at the parameter h of a path along which states and time change."""
+    """Evaluate a function at one point of a polynomial path of the states."""
     for i in range(C.shape[0]):
         total = C[i, 3]
         for k in range(2, -1, -1):
@@ -79,7 +79,7 @@ def _noise(function: Any, s: float, t: float, C: Any, p: Any, z: Any, x: Any, lo
 def along(
     function: Any, s: float, t: float, moving: float, C: Any, p: Any, z: Any, D: Any, B: Any, H: Any
 ) -> None:
-    """Write the Taylor coefficients (m, 4) of a function along a path, with bounds and step sizes.
+    """Compute Taylor coefficients (m, 4) of a function along a path by finite differences, with error bounds.
 
     C (n, 4): the path, as in `_at`. moving: 1 if time advances along the path, else 0.
     """

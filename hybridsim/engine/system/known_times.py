@@ -62,7 +62,7 @@ class KnownTimes(NamedTuple):
         return Instant(*self.instants[i].tolist())
 
     def up_to(self, target: Instant) -> KnownTimes:
-        """Return the known times before `target`, which is the target of the result."""
+        """Return the known times before a new target."""
         if target == self.target:
             return self
         m = int(np.count_nonzero(_minus(self.instants, np.array([target])) < 0.0))
@@ -199,7 +199,7 @@ class TimesAhead:
         )
 
     def _kind_at(self, members: list[int]) -> int | None:
-        """Return the kind of the known time at which some schedules are due and some inputs have knots."""
+        """Return the kind of a known time, from the schedules and inputs that belong to it."""
         if len(members) > 1:
             members.sort()
         if members[0] < 0 and not self._are_inputs_simple:
@@ -209,7 +209,7 @@ class TimesAhead:
 
 @per_structure
 def what_surfaces_read(system: System) -> tuple[bool, bool]:
-    """Return whether a surface reads an input, and whether a surface reads a discrete state."""
+    """Return whether any surface reads an input, and whether any surface reads a discrete state."""
     tape, layout, found = system.code.data["tape"], system.layout, []
     for sources in (range(layout.signals_at, layout.size), range(layout.discrete_at, layout.origin_at)):
         reading = {r for r, source in tape["parameters"] if source in sources}
@@ -222,7 +222,7 @@ def what_surfaces_read(system: System) -> tuple[bool, bool]:
 
 
 def _lengths(knots: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """Return the order of magnitude of the length of each piece, infinite for a constant or unlimited piece."""
+    """Return the length of each interval of an input, rounded to a power of a fixed ratio; infinity if constant."""
     found = np.full(len(rows), np.inf)
     varying = np.flatnonzero(rows[: len(knots), 1:START].any(axis=1))
     length = _minus(knots[varying], rows[varying, START:])

@@ -39,7 +39,7 @@ class Compiled:
         return self.module.DATA
 
     def lengths_to_compile(self) -> list[int]:
-        """Return the source lengths of the functions that have no machine code yet."""
+        """Return the lengths of the source texts that are not compiled yet."""
         from hybridsim.engine.native.model_functions import texts_to_compile
 
         return [len(text) for text in texts_to_compile(self.module)]
@@ -117,7 +117,7 @@ def _load(model: Model, name: str) -> Compiled:
 
 
 class _FromDisk(SourceFileLoader):
-    """Loads a module or its bytecode from files that only this user can have written."""
+    """Loads modules only from files that no other user can have written."""
 
     def get_data(self, path: str) -> bytes:
         """Return the bytes of a file."""

@@ -59,7 +59,7 @@ def limit_of(near: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def agreed(sides: list[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
-    """Return the limits on which all sides agree within their errors, else NaN; sides that are NaN are ignored."""
+    """Return the limit on which all sides agree within their errors, or NaN if they disagree."""
     limits, errors = (np.array(part) for part in zip(*sides, strict=True))
     errors = np.where(np.isnan(limits), np.inf, errors)
     best = np.argmin(errors, axis=0)[None]

@@ -1,4 +1,4 @@
-"""Find located guards that stay non-negative after the modes at surfaces are chosen, and so do not fire.
+"""This module finds located guards that do not fire, because the modes of surfaces keep them non-negative.
 
 A guard on the velocity of a contact reaches zero together with it, according to the motion before. If the contact then
 sticks, the guard stays at zero. If an impact reverses the motion, the guard only touches zero.

@@ -1,4 +1,4 @@
-"""This module determines verdicts on the combinations of modes from which the modes of a cluster are chosen."""
+"""This module judges all combinations of modes among which the modes of a cluster are chosen."""
 
 from __future__ import annotations
 

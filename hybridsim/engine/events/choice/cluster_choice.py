@@ -54,7 +54,7 @@ class ClusterChoice(EventVerdicts):
     """The joint choices of modes at one event, made in Python."""
 
     def choose_jointly(self, open_: set[int]) -> tuple[str, str] | None:
-        """Choose the modes of clusters with a component that fired, leaves its mode, or has no mode yet."""
+        """Choose the modes of each cluster that contains a component whose mode is open."""
         for cluster in self.system.clusters:
             if open_ & set(cluster):
                 failure = self._choose_cluster(cluster, open_)

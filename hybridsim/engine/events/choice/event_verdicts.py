@@ -60,12 +60,12 @@ class EventVerdicts(EventData):
         return bool(np.isfinite(self.series_of(z).guards[numbers[numbers >= 0], 0]).all())
 
     def verdict_on_guards(self, z: np.ndarray, components: list[int], continuous: bool) -> int:
-        """Return the verdict on the guards, without a check that the held surfaces are compatible."""
+        """Return the verdict on the guards only; whether surfaces can be held together is not checked."""
         members = np.array(components, dtype=np.int64)
         return int(_verdict(self.automata, None, 0, self.judged(z), z, members, continuous, True, 0))
 
     def is_continuous(self, z: np.ndarray, components: Iterable[int]) -> bool:
-        """Return whether the changes of mode of this event up to the modes `z` leave all unknowns continuous."""
+        """Return whether the mode changes of this event, up to the modes `z`, leave all unknowns continuous."""
         if self.jumped:
             return False
         members, event = np.array(list(components), dtype=np.int64), self.event()

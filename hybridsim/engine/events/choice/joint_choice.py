@@ -38,7 +38,7 @@ def is_below_limit(automata: Any, event: Any, c: int) -> bool:
 def rank_candidates(
     modes: Any, total: int, count: int, current: Any, holds: Any, keeps: Any, ranks: Any
 ) -> None:
-    """Write the rank of each joint candidate, or NO_CAUSE; `rank_of` defines the rank.
+    """Write the rank of each joint candidate, or NO_CAUSE for a release without a cause.
 
     modes (total, count): the candidates, one row each. current, holds (count,): the current and the holding modes.
     keeps (count,): contacts below their limits, which have no cause to leave their holding modes. Static friction above
@@ -70,7 +70,7 @@ def is_current(rank: int, count: int) -> bool:
 def joint_choice(
     chosen: int, score: int, number: int, rank: int, verdict: int, count: int
 ) -> tuple[int, int]:
-    """Return the choice and its score after the verdict on one more candidate.
+    """Return the best candidate so far and its score, after one more candidate has been judged.
 
     The choice is NONUNIQUE if two candidates share the highest score.
     """

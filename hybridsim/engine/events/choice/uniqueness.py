@@ -50,7 +50,7 @@ def other_outcomes(
     open_: set[int],
     cluster: tuple[int, ...],
 ) -> np.ndarray:
-    """Return admissible candidates with a motion other than the chosen one, if an opening gap changes a friction load.
+    """Return admissible candidates that differ in motion from the chosen one because a gap opens.
 
     Contacts that keep their mode are not examined, because the present mode stays if it is admissible.
     """

@@ -118,7 +118,7 @@ def zeros_of_surface(automata: Any, event: Any, z: Any, c: int, continuous: bool
 
 @inlined
 def decreed_zeros(automata: Any, event: Any, z: Any, c: int, j: int, g: int, continuous: bool) -> int:
-    """Return how many Taylor coefficients of a guard are zero by definition of the event in the modes `z`.
+    """Return how many leading Taylor coefficients of a guard are exactly zero because of the event.
 
     g: number of the guard; c, j: its component, and its index in the mode.
 

@@ -55,7 +55,7 @@ def may_vanish(
 def may_vanish_linear(
     lin: Any, tapes: Any, k: int, s: float, time: float, v: Any, sizes: Any, terms: Any
 ) -> bool:
-    """Return whether a guard of linear modes may be about to become negative, at modal coordinates `v`.
+    """Return whether a guard of linear modes may be close to zero at the modal coordinates `v`.
 
     terms (TERMS,): scratch.
     """

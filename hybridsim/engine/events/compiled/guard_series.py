@@ -1,4 +1,4 @@
-"""Compute the data of verdicts in compiled loops: Taylor series of guards, and jumps of unknowns."""
+"""This module computes Taylor series of guards and jumps of unknowns, by which compiled loops judge modes."""
 
 from __future__ import annotations
 

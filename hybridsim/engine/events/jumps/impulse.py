@@ -35,7 +35,7 @@ _OFF, _ON, _FORWARD, _BACKWARD = range(4)
 
 @dataclass(frozen=True)
 class ImpactProblem:
-    """An impact on several contacts, of which the normal contacts come first.
+    """The data of an impact on several contacts: normal contacts first, then friction contacts.
 
     Parameters
     ----------
@@ -160,7 +160,7 @@ def _same(one: Answer, other: Answer) -> bool:
 
 
 def _between(problem: ImpactProblem, dead: Answer, lively: Answer) -> Answer:
-    """Return the last impulses on the line from `dead` to `lively` at which the work is not positive.
+    """Return the last impulses on the line from `dead` to `lively` whose work is not positive.
 
     The work is quadratic in the position w on this line, not positive at 0 and positive at 1.
     """

@@ -43,7 +43,7 @@ _NO_INTERVALS = np.empty(0)
 def _follow(
     gap: float, now: float, i: int, known: int, longest: float, shortest: float, resolution: float, work: Any
 ) -> bool:
-    """Process the i-th interval, which ends now; return whether the series may have ended."""
+    """Process the i-th interval of a series of events; return whether the series may have reached its limit."""
     before, falls, ended = work[0], work[1], False
     is_nothing = gap <= max(shortest, _ULPS * 2.0**-52 * abs(now))
     end = max(resolution, _END * 2.0**-52 * abs(now), _FAR_DOWN * longest)
@@ -79,7 +79,7 @@ def may_end(
     work: Any,
     last: Any,
 ) -> tuple[bool, int]:
-    """Return whether the series of intervals continues or may have ended, and how many intervals it has.
+    """Return whether a series of intervals continues or may have ended, and the number of its intervals.
 
     In a series an interval is shorter than the one a turn before it, or negligible, many times in a row. The series has
     not ended while the next interval, predicted by the last factor, exceeds the threshold.
@@ -141,7 +141,7 @@ def cannot_accumulate(instants: Any, fires: Any, owner: Any, components: int, wo
 
 
 def turn_of(gaps: Sequence[float], count: int, same: float) -> tuple[int, float]:
-    """Return the events per cycle and the factor by which intervals shrink per cycle, or (0, 1).
+    """Return the number of events per cycle, and the factor by which intervals shrink per cycle.
 
     same : relative accuracy with which the factor must repeat.
     """
@@ -247,7 +247,7 @@ class Accumulation:
         return None
 
     def _paced(self, instants: np.ndarray, owners: np.ndarray, component: int) -> tuple[bool, Pace]:
-        """Return whether a component's accumulation may end with its new events, and the updated intervals."""
+        """Update the intervals of a component with new events; return also whether its accumulation may end."""
         pace = self.paces.get(component, BEGINNING)
         known = np.array(pace.intervals) if pace.intervals else _NO_INTERVALS
         at, work, last = (
@@ -284,7 +284,7 @@ class Accumulation:
         return None
 
     def _shared(self, time: float, first: int) -> Limit:
-        """Return the limit with all components whose events accumulate at this limit."""
+        """Return the limit of accumulation, with all components whose events accumulate there."""
         among = {first}
         for c in self.under_way:
             forecast = self.paces[c].forecast
@@ -354,7 +354,7 @@ def _expected(pace: Pace, instant: Instant) -> float | None:
 
 
 def _steadier(before: Pace, limit: float, least: float) -> tuple[float, float, float]:
-    """Return the most stable forecast of the limit so far, as (last change, least change, forecast).
+    """Return the most stable forecast of the limit so far, with its last change and its least change.
 
     The first forecasts miss the deviation of the series from a geometric one. The last ones are dominated by rounding,
     unless the events are located at zero.

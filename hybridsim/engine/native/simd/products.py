@@ -29,7 +29,7 @@ def vector_of(count: int) -> np.ndarray:
 
 
 def rows_of(matrix: np.ndarray, parts: Sequence[int] = ()) -> np.ndarray:
-    """Pad the columns of matrices (..., rows, columns) with zeros; `parts` are the lengths of the vectors."""
+    """Pad the columns of matrices (..., rows, columns) with zeros, separately for each part."""
     parts = parts or (matrix.shape[-1],)
     out = np.zeros((*matrix.shape[:-1], sum(map(filled_up, parts))))
     source = target = 0
@@ -178,7 +178,7 @@ else:
         )
 
     def times(row_blocks: Any, at: tuple[int, ...], vectors: tuple[Any, ...]) -> tuple[float, ...]:
-        """Multiply a block of four rows by several concatenated vectors."""
+        """Multiply a block of four matrix rows by several vectors in a row."""
         entries = _entries(vectors)
         return tuple((entries @ row_blocks[at][: len(entries)]).tolist())
 

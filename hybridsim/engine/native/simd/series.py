@@ -36,7 +36,7 @@ class Powers:
         return "<" + ", ".join(f"double {number(value)}" for value in values) + ">"
 
     def four(self, k: int) -> str:
-        """Return the powers from k to k + 3 as a vector."""
+        """Return the powers a**k to a**(k + 3) as one vector."""
         if k not in self._fours and k > 4:
             self._fours[k] = self._of_two("fmul", self.four(k - 4), self._fourth)
         elif k not in self._fours:
@@ -46,7 +46,7 @@ class Powers:
         return self._fours[k]
 
     def store(self, array: str) -> None:
-        """Write all powers to an array."""
+        """Write code that stores all powers in an array."""
         for k in range(self.order % 4 + 1):
             self.code.store(self._first[k], array, k)
         for k in self.begins:
@@ -90,7 +90,7 @@ class Powers:
         return found
 
     def terms(self, array: str, at: int) -> tuple[str, str, str]:
-        """Compute the sums over k > 0 of c_k a**k, of k times each term, and of the sizes of the terms."""
+        """Write code for three sums over k > 0: of c_k a**k, of k c_k a**k, and of the absolute values of the terms."""
         code, zero = self.code, self._constants([0.0] * 4)
         value, slope, size = zero, zero, zero
         for k in self.begins:

@@ -67,7 +67,7 @@ class CodeCache:
         self._known: tuple[Tapes | None, Any, Any] = (None, self._blank(0), None)
 
     def _blank(self, count: int) -> Any:
-        """Return codes without addresses, for a number of combinations of modes."""
+        """Return an empty table of code addresses for a number of combinations of modes."""
         return self.codes(*(np.zeros(count, dtype=np.int64) for _ in self.codes._fields))
 
     def of(self, tapes: Tapes) -> Any:

@@ -210,7 +210,7 @@ def _constant(value: float) -> Any:
 
 
 def _one_more(write: Any, place: int, component: int, mode: int, rest: Any) -> Any:
-    """Return a function that writes one number, or 1 if its mode is not active, and then calls `rest`."""
+    """Return a function that writes one number, then calls `rest`; the number is 1 in modes that do not use it."""
 
     @numba.njit
     def write_row(s: float, x: Any, p: Any, z: Any, out: Any) -> None:
@@ -224,7 +224,7 @@ def _one_more(write: Any, place: int, component: int, mode: int, rest: Any) -> A
 
 
 def _either(component: int, mode: int, write: Any, other: Any) -> Any:
-    """Return a flow that calls `write` in one mode and `other` in all other modes."""
+    """Return a function that calls `write` in one mode of a component, and `other` in its other modes."""
 
     @numba.njit
     def chosen(s: float, x: Any, p: Any, z: Any, out: Any) -> None:
