@@ -62,7 +62,7 @@ def of_run(run: Measured) -> tuple[str, str]:
 
 
 def refusal(error: Exception) -> str:
-    """Return the text of an error with its remedy; an unexpected exception is an internal error."""
+    """Return the text of an error with its remedy; an unexpected exception is called an internal error."""
     if isinstance(error, HybridsimError):
         return "; ".join(part for part in (error.message, error.remedy) if part)
     return f"internal error, please report it: {type(error).__name__}: {error}"

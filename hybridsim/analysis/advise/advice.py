@@ -84,7 +84,7 @@ class Advice(Readable):
         return next((s for s in self.settings if s.is_adequate), None)
 
     def __getitem__(self, name: str) -> Step:
-        """Return the simpler model with this name."""
+        """Return the simplified model with this name."""
         steps = {step.name: step for step in self.ladder}
         return steps[known_name(name, list(steps), "the advice has no simpler model", "rungs")]
 
@@ -120,7 +120,7 @@ class Advice(Readable):
         return printable("\n".join(lines))
 
     def to_dict(self) -> dict[str, Any]:
-        """Return all results as plain values; None replaces NaN and infinity."""
+        """Return all results as plain Python values; None replaces NaN and infinity."""
         return {
             "model": self.model.name,
             "quantity": self.quantity,

@@ -70,7 +70,7 @@ def relative_error(value: Number, full: Number) -> float:
 
 @dataclass(frozen=True)
 class Limits:
-    """The time limits for the parts of an advice.
+    """The time limits for the parts of an `advise` call.
 
     Parameters
     ----------
@@ -98,11 +98,11 @@ class Limits:
 
     @property
     def spent(self) -> str:
-        """The reason for a skipped computation, if no time was left."""
+        """The reason why a computation was skipped, if no time was left for it."""
         return f"the budget of {self.budget.seconds:.3g} s is spent"
 
     def warm(self, ask: Callable[[Watch | None], Answer], watch: Watch) -> Answer:
-        """Return the answer. A fast computation is repeated, so that its cost excludes one-time set-up."""
+        """Compute the answer; if this is fast, repeat it, so that the cost contains no one-time set-up."""
         first = ask(watch)
         if not self.repeat or first.seconds > _AGAIN_BELOW:
             return first

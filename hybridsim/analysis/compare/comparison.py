@@ -154,7 +154,7 @@ class Comparison(Readable):
         csv_records(path, self.records())
 
     def to_dict(self) -> dict[str, Any]:
-        """Return all results as plain values."""
+        """Return all results as plain Python values."""
         return {
             "title": self.title,
             "t_span": list(self.t_span),
@@ -170,7 +170,7 @@ class Comparison(Readable):
         }
 
     def records(self) -> list[dict[str, Any]]:
-        """Return the rows as plain values."""
+        """Return the rows as plain Python values."""
         return [self._record(row) for row in self.rows]
 
     def to_json(self, path: str | Path | None = None) -> str:

@@ -74,7 +74,7 @@ def choose_series(
     steps: Sequence[int] | None = None,
     untimed_span: float | None = None,
 ) -> tuple[Series, ...]:
-    """Return the series of runs of a comparison: an integrator or regularised law with its settings each.
+    """Return the series of runs that a comparison makes, each with one integrator and several settings.
 
     Parameters
     ----------

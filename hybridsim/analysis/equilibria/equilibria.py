@@ -192,7 +192,7 @@ def _extent(field: Field, x: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None
 
 
 def _farthest(field: Field, x: np.ndarray, i: int, side: float) -> float | None:
-    """Return the least (side 1) or greatest (side -1) value of state i, found by a sequence of linear programs."""
+    """Return the extreme value of state i, least (side 1) or greatest (side -1), by a sequence of linear programs."""
     at = x
     for _ in range(_ROUNDS):
         solved = _program(field, at, i, side)

@@ -126,7 +126,7 @@ class Residuals:
         return self._point(coordinates).values
 
     def _point(self, coordinates: np.ndarray) -> _Point:
-        """Simulate all records with the given coordinates, unless these are the coordinates of the last call."""
+        """Simulate all records with the given coordinates, unless the last call had the same coordinates."""
         key = coordinates.tobytes()
         if key not in self._points:
             of_slopes = self._slopes[0] if self._slopes is not None else b""

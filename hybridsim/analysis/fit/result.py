@@ -159,7 +159,7 @@ class Fit(Readable):
         return import_module("hybridsim.plot").fit(self)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return values, errors, 95 % intervals, noise and warnings as plain values."""
+        """Return values, errors, 95 % intervals, noise and warnings as plain Python values."""
         return {
             "model": self.model.name,
             **fields_of(self, "success", "message"),

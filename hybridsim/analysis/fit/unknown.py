@@ -80,7 +80,7 @@ class Unknown:
 
 
 def start_of(state: str) -> str:
-    """Return the name of the start value of a state as an unknown."""
+    """Return the name under which a fit varies the start of a state, such as "x(0)"."""
     return f"{state}(0)"
 
 

@@ -1,4 +1,4 @@
-"""This module rewrites models: forces in place of contacts, other friction laws, more parameters."""
+"""This module rewrites models: it replaces contacts by forces, changes friction laws and adds parameters."""
 
 from __future__ import annotations
 

@@ -67,7 +67,7 @@ class NoStopMotion:
         return found
 
     def harmonic(self, name: str, k: int) -> complex:
-        """Return the harmonic as `SteadyState.harmonic` does, with t counted from phase zero."""
+        """Return a harmonic as `SteadyState.harmonic` does, but with the time counted from the forcing's phase zero."""
         if k == 0:
             return complex(self.mean[name])
         if k % 2 == 0:

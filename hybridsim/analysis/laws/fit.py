@@ -17,7 +17,7 @@ _GAIN = 1e-3  # a smaller relative gain of a round ends the search
 
 
 def piecewise_linear(x: object, y: object, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return knots (count,) and values (count,) of the continuous piecewise linear function of least squares.
+    """Return knots (count,) and values (count,) of the continuous piecewise linear function that fits best.
 
     The first and last knot are the ends of the data. The others are inserted one by one where they help most. After
     each insertion all of them are optimised together. At last each knot is taken out and inserted again, as long as

@@ -111,7 +111,7 @@ class LawComparison(Readable):
         return "\n".join([*lines, *(f"{row.label}: {row.solution.message}" for row in failed)])
 
     def records(self) -> list[dict[str, Any]]:
-        """Return the rows as plain values."""
+        """Return the rows as plain Python values."""
         return [
             {
                 "label": row.label,

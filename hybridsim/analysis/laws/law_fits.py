@@ -65,7 +65,7 @@ class LawFits(Readable):
         return {label: each / total for label, each in found.items()}
 
     def records(self) -> list[dict[str, Any]]:
-        """Return the rows as plain values."""
+        """Return the rows as plain Python values."""
         return [
             {"label": row.label, "aicc": row.aicc, "held_out": row.held_out, **row.fit.to_dict()}
             for row in self.rows

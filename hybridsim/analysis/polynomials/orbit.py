@@ -140,7 +140,7 @@ class Orbit:
         return Turns(q, k, times, turned, before < 0.0)
 
     def _blocks(self) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
-        """Yield batches of pieces: their numbers, Legendre coefficients (k * Q, POINTS) and validity masks (k, Q)."""
+        """Yield batches of intervals: their numbers, Legendre coefficients (k * Q, POINTS) and masks (k, Q)."""
         block = max(1, _SLOPES_PER_BATCH // (_DENSE * len(self.names)))
         for first in range(0, max(len(self.values), 1), block):
             chosen = slice(first, first + block)

@@ -1,4 +1,4 @@
-"""This module differentiates a periodic motion and its readings by parameters, by the implicit function theorem.
+"""This module computes derivatives of a periodic motion with respect to parameters, by the implicit function theorem.
 
 The motion starts at x and repeats after its period T, so that Phi(T, x, p) = x. With the monodromy matrix M, the
 derivative Phi_p of the end by parameters, and the rates f at the end,

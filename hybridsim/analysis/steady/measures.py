@@ -116,7 +116,7 @@ class Measures:
         return ByName(lambda: (self._contacts, frozenset()), measure, "contact", self._summed(head))
 
     def _summed(self, head: str) -> dict[str, float]:
-        """Return the values of one measure that the summary of the motion contains."""
+        """Return the values of one measure that a summary of the motion already contains."""
         return {}
 
     @property
@@ -237,7 +237,7 @@ class Measures:
         return spent / (self.solution.t_end - self.solution.t_start)
 
     def held_mode(self, contact: str) -> str:
-        """Return the mode that counts as stick: ``stick``, or the mode in which a switching surface is followed."""
+        """Return the name of the stick mode, or of the mode in which the motion follows a switching surface."""
         automata = {a.name: a for a in self.solution._system.automata if a.has_surface}
         automaton = automata[
             known_name(contact, list(automata), "the steady state has no contact", "contacts")

@@ -152,7 +152,7 @@ class SteadyState(Readable, Measures):
 
     @refusing
     def sensitivities(self, parameters: Sequence[str] | None = None) -> SteadySensitivities:
-        """Differentiate the periodic motion, its period and its readings by parameters.
+        """Compute derivatives of the periodic motion, its period and its measures with respect to parameters.
 
         ::
 
@@ -197,7 +197,7 @@ class SteadyState(Readable, Measures):
         )
 
     def to_dict(self, harmonics: int = 5) -> dict[str, Any]:
-        """Return all results as plain values, with harmonics up to a given order and their phases in radians.
+        """Return all results as plain Python values, with harmonics up to a given order and their phases in radians.
 
         If the motion has no multipliers, ``multipliers`` and ``stable`` are None, and ``no_multipliers`` gives the
         reason.

@@ -235,7 +235,7 @@ class _Search:
             passings = self._follow(passings)
 
     def _not_below_rounding(self, passings: Passings) -> Passings:
-        """Return the passages with scales that are not smaller than rounding errors.
+        """Return the passages after raising those scales that are smaller than rounding errors.
 
         A state that has decayed relative to its former size has no scale of its own. A discrete state that
         settles on zero gets its size from the other states: from the effect over one period of a change of

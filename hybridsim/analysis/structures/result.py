@@ -26,7 +26,7 @@ _MODES = {0: "stick", 1: "slip+", -1: "slip-"}
 
 
 class StructureSteadyState(SteadyState):
-    """A `SteadyState` of a `MechanicalSystem`; it is read from the Taylor series of each coordinate.
+    """A `SteadyState` of a `MechanicalSystem`, computed from the Taylor series of each coordinate.
 
     Parameters
     ----------
@@ -131,7 +131,7 @@ class StructureSteadyState(SteadyState):
         )
 
     def held_mode(self, contact: str) -> str:
-        """Return the mode that counts as stick."""
+        """Return the name of the stick mode."""
         self._require_period()
         return "stick"
 
@@ -160,7 +160,7 @@ class StructureSteadyState(SteadyState):
         self._refuse_derivatives("multipliers")
 
     def sensitivities(self, parameters: Sequence[str] | None = None) -> NoReturn:
-        """Refused, because a run of a `MechanicalSystem` carries no derivatives."""
+        """Raise an error, because a run of a `MechanicalSystem` provides no derivatives."""
         self._refuse_derivatives("sensitivities")
 
     def _refuse_derivatives(self, what: str) -> NoReturn:

@@ -115,7 +115,7 @@ class Settling:
                 self._extrapolate(passings.scale)
 
     def _multiple(self, passings: Passings) -> int | None:
-        """Return the number of periods after which the motion repeats, or None if this number is not yet certain."""
+        """Return the number of periods after which the motion repeats, or None while this number is not certain."""
         found = passings.repeats_after(self.tol)
         if found is None and self._is_exhausted and passings.residual(1) <= self.tol:
             return 1

@@ -123,5 +123,5 @@ def is_structure(model: object) -> bool:
 
 
 def declared(model: Model | SweptSystem) -> Any:
-    """Return what the user declared: a `Model`, or the `MechanicalSystem`."""
+    """Return the declared system: a `Model` or a `MechanicalSystem`."""
     return model.system if isinstance(model, SweptSystem) else model

@@ -148,7 +148,7 @@ class SuiteComparison(Readable):
         csv_records(path, [{"scene": scene, **row} for scene, row in rows])
 
     def to_dict(self) -> dict[str, Any]:
-        """Return all results as plain values."""
+        """Return all results as plain Python values."""
         return {
             "repeat": self.repeat,
             "budget": self.budget,

@@ -30,7 +30,7 @@ DIRECTION = "direction"
 
 
 class _UpAndDown:
-    """The values of one parameter in rising order and then in falling order, as one chain of runs."""
+    """The values of one parameter in rising order and then in falling order, as one series of runs."""
 
     def __init__(self, points: Points, count: int) -> None:
         rows = points.settings(range(count))
@@ -40,7 +40,7 @@ class _UpAndDown:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Number of steps along the chain, and number of chains."""
+        """Number of steps in a chain of runs, and number of chains."""
         return 2 * len(self._rising), 1
 
     def settings(self, numbers: range) -> list[Settings]:

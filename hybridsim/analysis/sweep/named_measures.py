@@ -62,7 +62,7 @@ class Steady:
     options: Mapping[str, Any]
 
     def nothing(self) -> dict[str, float | str]:
-        """Return the values stored for a point that has no result."""
+        """Return placeholders, such as NaN, for the values of a point without a result."""
         return {word: "" if word in _TEXTS else math.nan for word in self.reading_names}
 
     def run(self, model: Model, previous: SteadyState | None) -> SteadyState:

@@ -140,7 +140,7 @@ class Sweep(Readable):
                 writer.writerow([_plain(column[k]) for column in columns.values()])
 
     def to_dict(self) -> dict[str, Any]:
-        """Return all results as plain values; None replaces NaN and infinity."""
+        """Return all results as plain Python values; None replaces NaN and infinity."""
         return {
             "model": self.model.name,
             "measure": self.measure,

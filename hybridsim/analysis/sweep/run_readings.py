@@ -27,7 +27,7 @@ _PASSAGE = re.compile(r"first_passage\.([^<>]+)([<>])([^<>]+)")
 
 @dataclass(frozen=True)
 class Passage:
-    """The quantity, direction and level of a reading such as ``first_passage.x>0.1``."""
+    """The quantity, direction and level in a name such as ``first_passage.x>0.1``."""
 
     quantity: str
     is_upward: bool
@@ -42,7 +42,7 @@ class OfRun:
     options: Mapping[str, Any]
 
     def nothing(self) -> dict[str, float | str]:
-        """Return the values stored for a point that has no result."""
+        """Return placeholders, such as NaN, for the values of a point without a result."""
         return dict.fromkeys(self.reading_names, math.nan)
 
     def run(self, model: Model, previous: OverRun | None) -> OverRun:
@@ -76,7 +76,7 @@ class OfRun:
 
 
 def of_run(reading_names: Sequence[str], model: Model, options: Mapping[str, Any]) -> OfRun:
-    """Return a measure that reads values such as ``final.x`` from runs; "final" stands for the end of all states.
+    """Return a measure that reads values such as ``final.x`` from runs; "final" alone means all final states.
 
     Raises
     ------

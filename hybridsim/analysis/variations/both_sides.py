@@ -39,7 +39,7 @@ class OneSide:
         return _shift(self._carried, number)
 
     def own_sizes(self) -> np.ndarray:
-        """Return, for each direction, the length of a change that alters some quantity by its own size."""
+        """Return, for each direction, how large a change must be to alter some quantity by its own size."""
         found: np.ndarray = self._carrier.own_sizes(self._directions)
         return found
 

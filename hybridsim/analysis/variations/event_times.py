@@ -96,7 +96,7 @@ class EventTimes:
         Yd: np.ndarray,
         is_first: bool,
     ) -> Shift | None:
-        """Return the derivatives of the time of an event, or None if another event caused the event."""
+        """Return the derivatives of the time of an event, or None if the event was caused by another event."""
         system = self.system
         is_monitor = one.kind == "monitor"
         if is_monitor:
@@ -123,7 +123,7 @@ class EventTimes:
         return Shift(-found.by / rate, found.sizes / abs(rate))
 
     def scheduled(self, one: Occurrence) -> list[np.ndarray]:
-        """Return the derivatives (M,) of a scheduled time, for each declared time that may have caused the event."""
+        """Return the derivatives (M,) of each declared time that may have caused a scheduled event."""
         width = self._changes.G.shape[1]
         declared = next((c for c in self.system.model.schedules if c.name == one.component), None)
         if declared is None:

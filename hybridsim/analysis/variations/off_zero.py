@@ -241,7 +241,7 @@ class _Sides:
         return [self.off(name, one, other, there, 0.0)]
 
     def limits(self, c: int) -> list[OffZero]:
-        """List the force limits that a component reaches exactly, either in its holding mode or just before it."""
+        """List the force limits that a component reaches exactly, in its holding mode or just before it."""
         automaton, off = self.system.automata[c], []
         z = self._with(c, automaton.hold)
         numbers = automaton.guards[automaton.hold]

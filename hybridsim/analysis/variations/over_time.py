@@ -21,7 +21,7 @@ from hybridsim.solution import Solution
 
 @dataclass(frozen=True)
 class Derivatives(Readable):
-    """Derivatives of m quantities of a run at fixed times, by the initial state and by parameters.
+    """Derivatives of m quantities of a run at fixed times, with respect to initial state and parameters.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ class OverTime:
         return self._sides.shift(number)
 
     def own_sizes(self) -> np.ndarray:
-        """Return, for each direction, the length of a change that alters some quantity by its own size."""
+        """Return, for each direction, how large a change must be to alter some quantity by its own size."""
         return self._sides.own_sizes()
 
     def at_end(self) -> np.ndarray:

@@ -168,7 +168,7 @@ class Rounds:
         self.shift = self.shift + later
 
     def _reading(self) -> np.ndarray:
-        """Return the modes without constraints that begin only later at this instant."""
+        """Return the modes that hold before components enter their holding modes at this instant."""
         z = self.z.copy()
         for c, mode in self._loose:
             z[c] = mode

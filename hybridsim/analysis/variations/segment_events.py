@@ -34,7 +34,7 @@ class Last(NamedTuple):
 
 
 def segment_events_of(solution: Solution) -> Iterator[SegmentEvents]:
-    """Yield the segments, each with the events at its end that changed modes or states."""
+    """Yield the segments of a run, each with the events at its end that changed modes or states."""
     waiting = [o for o in solution._of_model.record.occurrences if o.kind != "near-grazing"]
     at, segments = 0, list(solution._segments)
     for segment, following in zip(segments, [*segments[1:], None], strict=True):

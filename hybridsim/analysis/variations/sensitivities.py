@@ -100,7 +100,7 @@ class Sensitivities(Readable):
     def of(
         self, reading: str, *quantities: str, t_span: tuple[float, float] | None = None
     ) -> ReadingDerivatives:
-        """Return a reading of the run and its derivatives: an extreme value, an amplitude, an integral or a mean.
+        """Return an extreme value, an amplitude, an integral or a mean of the run, with its derivatives.
 
         ::
 

@@ -1,4 +1,4 @@
-"""This module follows a segment of linear modes in closed form up to the first event."""
+"""This module computes a segment of linear motion in closed form, up to the first event."""
 
 from __future__ import annotations
 

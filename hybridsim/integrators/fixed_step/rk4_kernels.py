@@ -20,7 +20,7 @@ def _any_held(table: Any, z: Any) -> bool:
 
 
 def workspace(n: int, surfaces: int, guards: int, monitors: int, rows: int) -> tuple[np.ndarray, ...]:
-    """Allocate the work arrays of the kernels.
+    """Allocate the scratch arrays of the kernels.
 
     Surface values and eps; results of a step (see `step_code`); guard values; monitor values at both ends of a step.
     """
@@ -70,7 +70,7 @@ def _halve_step(
     guards: Any,
     counters: Any,
 ) -> float:
-    """Bisect a step until surface `row` is within `eps` of zero, or for row < 0 until a stick limit is exceeded.
+    """Bisect a step until surface `row` is zero within `eps`; for row < 0, until a stick limit is exceeded.
 
     Write the results of the last step to `out` and return its length.
     """

@@ -60,7 +60,7 @@ def _checkpoint(
 
 
 def surface_table(system: System) -> np.ndarray:
-    """Return the numbers of the component, modes and guards for each component with a surface.
+    """Return the numbers of component, modes and guards for each component with a surface.
 
     The entries of a gap that do not exist are -1.
     """

@@ -218,7 +218,7 @@ class StepCode:
 
 @lru_cache(maxsize=_STRUCTURES)
 def step_functions(module: ModuleType, code: StepCode) -> tuple[list[Any], Any]:
-    """Return the functions choose, step and march for a model, and an object that keeps them alive.
+    """Return the compiled step functions of a model, and an object that keeps their code in memory.
 
     Each is called with (t, x, p, z, out). choose sets the modes z from the state: outside eps the mode of that side;
     inside it (ZONE, Eq. 4 of the paper) the holding mode while the unknown stays within its limits, else the side to

@@ -1,4 +1,4 @@
-"""This module follows a segment by Taylor steps up to the first event."""
+"""This module integrates the motion up to the next event by Taylor steps."""
 
 from __future__ import annotations
 

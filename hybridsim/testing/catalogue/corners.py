@@ -75,7 +75,7 @@ def _hinge() -> Scene:
 
 
 def _elastogap() -> Scene:
-    """Return the scene of the motion MSL-elastogap, declared with corners instead of modes."""
+    """Return the scene MSL-elastogap, declared with corners instead of modes."""
     states = tuple((row[0], tuple(row[1:])) for row in TRUTHS["MSL-elastogap"]["states"])
     return named("elastogap-clipped", (0.0, 5.0), Truth((), states), unit=2.0, speed=3.0, tol_x=1e-7)
 

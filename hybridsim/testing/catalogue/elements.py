@@ -16,7 +16,7 @@ def scenes() -> tuple[Scene, ...]:
 
 
 def _transitions(component: str, expected: Sequence[tuple[float, str]], within: float = 1e-3) -> Check:
-    """Return a function that checks that a component changes its mode near the expected times and never else."""
+    """Return a function that checks that a component changes its mode only near the expected times."""
 
     def check(solution: Any) -> list[str]:
         found = [(event.t, event.target) for event in solution.events if event.component == component]
@@ -57,7 +57,7 @@ def _directions() -> Scene:
 
 
 def _elements() -> Scene:
-    """Return the scene of elements that follow x = sin(t), whose integrals until t = 10 are sums over their modes."""
+    """Return the scene of elements that follow x = sin(t), with closed forms for their integrals until t = 10."""
     end, sixth, three = 10.0, math.pi / 6, 3 * math.pi
     on = 2 * math.pi  # from 1/2 to -1/2, twice
     half_wave = 4 * math.sin(sixth / 2) ** 2 + 2 * sixth  # 2 (1 - cos(pi/6)) + (4 pi/6)/2

@@ -102,7 +102,7 @@ class Readings:
         self._solution = found.solution
 
     def of(self, reading: str, names: Sequence[str]) -> tuple[float, np.ndarray]:
-        """Return the value of a reading of some quantities, and its derivatives (M,)."""
+        """Return the value of a reading, such as a maximum or a mean, and its derivatives (M,)."""
         if reading in ("integral", "mean"):
             value, slope = self._integral(names)
             share = 1.0 / (self._high - self._low) if reading == "mean" else self._sign
@@ -166,7 +166,7 @@ class Readings:
         return float(self._solution._segments[place.number].origin.plus(place.s))
 
     def at_end(self, names: Sequence[str]) -> float:
-        """Return the value of a product at the end of the run, just before any event at this end."""
+        """Return the value of a product of quantities at the end of the run, just before any event at this end."""
         lengths = np.diff(self._solution._segments.spans(), axis=1)
         return self._product(names, int(np.flatnonzero(lengths > 0.0)[-1]), -1)
 

@@ -59,7 +59,7 @@ def expression_slope(
 
 
 def _derivative(expression: Expression, name: str, values: Mapping[str, float]) -> float:
-    """Return the derivative of an expression with respect to one name; at a kink, return the limits from both sides."""
+    """Return the derivative of an expression with respect to a name; at a kink, return the limits from both sides."""
     found = _slope(expression, name)
     if not any(is_at_edge(node, values) for node in ast.walk(expression.tree) if isinstance(node, ast.expr)):
         return evaluate(found, values)

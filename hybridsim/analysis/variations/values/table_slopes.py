@@ -46,7 +46,7 @@ def table_value(model: Model, name: str) -> TableValue | None:
 
 
 class TableSlopes:
-    """Derivatives of a table by one of its values."""
+    """Derivatives of a table with respect to one of its values."""
 
     def __init__(self, declared: Input, index: int) -> None:
         values = tuple(float(k == index) for k in range(len(declared.values)))

@@ -19,7 +19,7 @@ from hybridsim.model.smoothing.steps_in_time import constant_inputs
 
 
 class VectorSlopes:
-    """Derivatives of the run-time vector by the d discrete states, the P parameters and V values of tables.
+    """Derivatives of the run-time values with respect to discrete states, parameters and values of tables.
 
     Parameters
     ----------
