@@ -39,7 +39,7 @@ class LawReadings:
 
 
 def law_readings(measure: Any, models: Iterable[Model], period: float | None) -> LawReadings:
-    """Return the readings by their names, each of which at least one of the models must have."""
+    """Return the readings with the given names; each name must be valid for at least one model."""
     if measure is None:
         return LawReadings((), period)
     names = (measure,) if isinstance(measure, str) else tuple(measure) if is_row(measure) else ()
@@ -60,7 +60,7 @@ def law_readings(measure: Any, models: Iterable[Model], period: float | None) ->
 
 
 def _first_valid(name: str, models: Iterable[Model], period: float | None) -> tuple[str, ...]:
-    """Return the names of a measure of the first model that has it, or raise the error of the first model."""
+    """Return the reading names of a measure, according to the first model that supports it."""
     faults = []
     for model in models:
         try:

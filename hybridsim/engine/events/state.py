@@ -33,7 +33,7 @@ _INTEGERS = ("z", "sides", "orders")
 
 
 class _Layout:
-    """The places of the arrays in the memory of a state, in doubles."""
+    """The positions of the arrays in the memory of a state, counted in doubles."""
 
     def __init__(self, lengths: Sequence[int]) -> None:
         *begins, self.size = accumulate(map(filled_up, lengths), initial=0)
@@ -78,7 +78,7 @@ class HybridState:
         return state
 
     def __getattr__(self, name: str) -> np.ndarray:
-        """Create the view of an array when the attribute is first read."""
+        """Make the view of an array in this memory block when it is first read."""
         if name not in _FIELDS:
             raise AttributeError(name)
         shape, dtype, offset = self._layout.views[name]

@@ -20,7 +20,7 @@ _SWEEPS = 8  # most sweeps of balancing
 
 
 class Balanced(NamedTuple):
-    """Balanced matrices of which the block diagonal forms are computed, and what is known of their eigenvectors."""
+    """Balanced matrices, their eigenvectors, and whether these form an accurate basis."""
 
     scales: np.ndarray  # (K, m) the diagonal D
     balanced: np.ndarray  # (K, m, m) D^-1 A D

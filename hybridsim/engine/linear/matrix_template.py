@@ -26,7 +26,7 @@ _lock = SharedLock()
 
 
 class MatrixTemplate:
-    """The matrices of some linear modes: their entries are registers of a recorded computation.
+    """The matrices of some linear modes, computed from parameters by a recorded computation.
 
     begun: a template of the first of these vectors, at values for which it holds; the other vectors are added to
     it.
@@ -121,7 +121,7 @@ class MatrixTemplate:
 
 @kernel
 def put_entries(registers: Any, flow: Any, guards: Any, n: int, A: Any, rows: Any, usable: Any) -> None:
-    """Write the matrices of all points and the mask of usable modes; A and rows are zero."""
+    """Write the matrices of all points and a mask of the usable modes."""
     for entries, out in ((flow, A.reshape(-1)), (guards, rows.reshape(-1))):
         size = out.shape[0] // registers.shape[0]
         for point in range(registers.shape[0]):
@@ -134,7 +134,7 @@ _put_entries = Precompiled(put_entries)
 
 
 def _factors(monomials: Sequence[Sequence[int]], one: int) -> np.ndarray:
-    """Return the factors of each monomial, padded with factors 1 to equal length."""
+    """Return the factors of each monomial, padded with ones to equal length."""
     factors = np.full((len(monomials), max(map(len, monomials))), one, dtype=np.int64)
     for row, monomial in zip(factors, monomials, strict=True):
         row[: len(monomial)] = monomial
@@ -145,7 +145,7 @@ templates_of = per_structure(lambda system: dict[bytes, list[MatrixTemplate]]())
 
 
 def template_of(system: System, met: np.ndarray, p: np.ndarray) -> tuple[MatrixTemplate, np.ndarray]:
-    """Return the matrix template of some modes that is valid at the parameters `p`, and its registers."""
+    """Return the matrix template of some modes at the parameters `p`, and its computed values."""
     cached, key = templates_of(system), met.tobytes()
     inputs = p[: system.layout.parameters]
     with _lock:
@@ -173,7 +173,7 @@ def _with_values(template: MatrixTemplate, inputs: np.ndarray) -> tuple[MatrixTe
 def _that_holds(
     templates: Iterable[MatrixTemplate], inputs: np.ndarray
 ) -> tuple[MatrixTemplate, np.ndarray] | None:
-    """Return the first template that is valid for the given inputs, and its registers."""
+    """Return the first template that is valid for the given inputs, and its computed values."""
     for template in templates:
         registers = template.recipe.values(inputs)
         if registers is not None:
@@ -184,7 +184,7 @@ def _that_holds(
 def _begun(
     cached: dict[bytes, list[MatrixTemplate]], met: np.ndarray, inputs: np.ndarray
 ) -> MatrixTemplate | None:
-    """Return the template of the longest cached list of modes that is a prefix of the given list."""
+    """Return the cached template that covers as many of the given modes as possible."""
     whole = met.tobytes()
     for key in sorted((key for key in cached if whole.startswith(key)), key=len, reverse=True):
         found = _that_holds(cached[key], inputs)

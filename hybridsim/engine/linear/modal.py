@@ -71,7 +71,7 @@ class _Cluster:
 
 
 class _Block(NamedTuple):
-    """The triangular block of a cluster, for the basis `vectors @ rotation`.
+    """The triangular block of a cluster of eigenvalues, with the basis of its invariant subspace.
 
     vectors: an orthonormal basis of its invariant subspace, real if the block is folded.
     """
@@ -104,7 +104,7 @@ def modal(A: np.ndarray, horizon: float = math.inf) -> Modal:
 def modals(
     A: np.ndarray, horizon: float = math.inf, exponent: int = 1, multiple: int = 1, least: int = 0
 ) -> tuple[Modals, int]:
-    """Return the block diagonal forms of many matrices (K, m, m), padded to a common size, as a pack, and this size."""
+    """Return the block diagonal forms of many matrices (K, m, m), padded to a common size, and this size."""
     count, size, others = *A.shape[:2], {}
     found: Balanced = layout_of_balanced(count, size).zeros()
     _balance(A, horizon, found)
@@ -132,7 +132,7 @@ def modals(
 
 @lru_cache(64)
 def _layout(count: int, size: int, widest: int) -> ArrayLayout:
-    """Return the layout of `Modals` of matrices (count, size, size) with at most `widest` coordinates."""
+    """Return the memory layout of the block diagonal forms of several matrices."""
     fields: list[tuple[Any, tuple[int, ...]]] = [
         (np.int64, ()), (complex, (widest,)), (complex, (widest, widest)), (np.int64, (widest,)),
         (complex, (size, widest)), (complex, (widest, size)), *[(float, (widest,))] * 3,
@@ -198,7 +198,7 @@ def _partners(values: np.ndarray) -> list[int]:
 
 
 def _columns(clusters: list[_Cluster], blocks: list[_Block]) -> np.ndarray:
-    """Return the whole basis, with real and imaginary parts of the blocks of complex pairs."""
+    """Return the matrix of all basis vectors, as real and imaginary parts for complex pairs."""
     parts = [
         b.vectors if c.folded else np.concatenate([b.vectors.real, b.vectors.imag], axis=1)
         for c, b in zip(clusters, blocks, strict=True)
@@ -245,7 +245,7 @@ def _combined(clusters: list[_Cluster], values: np.ndarray) -> list[_Cluster]:
 
 
 def _block(A: np.ndarray, cluster: _Cluster, values: np.ndarray, partners: list[int]) -> _Block:
-    """Return the triangular block of a cluster, or an empty block if the cluster cannot be separated."""
+    """Return the triangular block of an eigenvalue cluster, or an empty block if the cluster cannot be separated."""
     from scipy.linalg import rsf2csf, schur
 
     members = list(cluster.members)
@@ -269,7 +269,7 @@ def _block(A: np.ndarray, cluster: _Cluster, values: np.ndarray, partners: list[
 
 
 def _joined(A: np.ndarray, clusters: list[_Cluster], blocks: list[_Block], scale: np.ndarray) -> Modal:
-    """Return all blocks as arrays, one for each conjugate pair."""
+    """Join all triangular blocks to arrays, with one block for each conjugate pair."""
     inverse = np.linalg.inv(_columns(clusters, blocks))
     width = sum(len(b.triangular) for b in blocks)
     values, ends = np.empty(width, dtype=complex), np.empty(width, dtype=np.int64)

@@ -156,7 +156,7 @@ def moved(lin: Any, k: int, c: Any, d: float, out: Any) -> None:
 
 @allocating_kernel
 def _move_block(lin: Any, k: int, first: int, end: int, c: Any, d: float, out: Any) -> None:
-    """Advance a block of coordinates by an exponential and a Taylor series; the result is NaN for long times."""
+    """Advance a block of coordinates by an exponential and a Taylor series; for too long times the result is NaN."""
     size = end - first
     mean = 0.0 + 0.0j
     for j in range(first, end):

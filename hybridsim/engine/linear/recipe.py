@@ -50,7 +50,7 @@ class Numbers:
         return self._constants[name]
 
     def operation(self, op: int, values: Sequence[float], b: int = 0, c: int = 0) -> tuple[Traced, Traced]:
-        """Record one instruction of a tape that is applied to numbers."""
+        """Record one instruction and the result that it has for given numbers."""
         operand_registers, out = [self.place(value) for value in values], len(self.values)
         self.rows.append(
             (op, operand_registers[0], operand_registers[1] if len(operand_registers) > 1 else b, c, out)
@@ -79,7 +79,7 @@ def _operators(op: int) -> tuple[Any, Any]:
 
 
 class Traced(float):
-    """A float that stores its register in the recorded computation."""
+    """A float that remembers which register of the recorded computation holds it."""
 
     __slots__ = ("numbers", "register")
     numbers: Numbers
@@ -162,7 +162,7 @@ class Recipe:
         return registers.reshape(-1) if holds else None
 
     def values_at(self, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return all registers for many inputs, and a mask of the inputs for which all comparisons agree."""
+        """Repeat the computation for many inputs; also return a mask of the inputs with the same comparisons."""
         found, holds = np.empty((len(inputs), len(self._start))), np.empty(len(inputs), dtype=np.bool_)
         again = self._rows, self._start, self._compared, np.array(inputs, dtype=float)
         _repeat_each(*again, np.empty_like(self._start), found, holds)

@@ -1,4 +1,4 @@
-"""This module scales the states and functions of time of linear modes to the length of the pieces of inputs."""
+"""This module scales linear modes so that inputs with short intervals cause no large numbers."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def horizon_class(horizon: float) -> float:
 def scaled_modals(
     A: np.ndarray, units: np.ndarray | None, horizon: float, least: int = 0
 ) -> tuple[Modals, int]:
-    """Return what `modals` returns for matrices (K, m, m), computed in units (K, m) of their variables."""
+    """Return the block diagonal forms of matrices (K, m, m) in units (K, m) of their variables, as `modals` does."""
     if units is None:
         return modals(A, horizon, BOUND_TERMS, multiple=LANES // 2, least=least)
     scaled = A * units[:, None, :] / units[:, :, None]
@@ -35,7 +35,7 @@ def scaled_modals(
 
 
 def units_of(atoms: tuple[np.ndarray, ...], A: np.ndarray, n: int, length: float) -> np.ndarray:
-    """Return units (K, m) of the variables: their sizes if inputs of size 1 vary over pieces of a given length.
+    """Return units (K, m) of the variables, so that inputs with short intervals cause no large rounding errors.
 
     A coefficient of a short piece is large, and its effect on a state is small. In other units the state would have an
     error relative to the coefficient. The units are powers of two, so that they cause no rounding errors.
@@ -64,7 +64,7 @@ def _powers_of_time(
     factors: np.ndarray,
     angles: np.ndarray,
 ) -> np.ndarray:
-    """Return the power of time in the unit of each monomial: -2 for the second derivative of an input."""
+    """Return the power of time in the unit of each monomial, such as -2 for a second derivative."""
     powers = np.zeros(2 * len(kinds) + 1, dtype=np.int64)
     for a, kind in enumerate(kinds):
         if kind == TIME:

@@ -14,7 +14,7 @@ from hybridsim.expr.simplify import simplified
 def normal_loads(
     lowering: LoweringState, unknown: dict[int, Any], definitions: dict[Any, Any]
 ) -> dict[tuple[int, int], dict[str, Any]]:
-    """Return the derivatives of slip forces with respect to normal forces, by contact, impact and mode.
+    """Return the derivatives of slip forces with respect to normal forces.
 
     A normal force that only the contact's guards use has an entry without modes.
     """

@@ -18,7 +18,7 @@ if ENABLED:
     from hybridsim.engine.native.struct_pack import Packed, type_of_fields
 
     class LayoutPack(Packed):
-        """A pack of the arrays of a layout; each array is made when it is first read in Python."""
+        """The arrays of a layout as one pack; each array is made when it is first read in Python."""
 
         def __init__(
             self,
@@ -40,7 +40,7 @@ if ENABLED:
 
 
 def release(pack: Any) -> None:
-    """Return the arrays of a pack to their layout, whose next `zeros` uses them again; nothing else may use them."""
+    """Give the arrays of a pack back to their layout, which uses them again; nothing else may use them."""
     if ENABLED:
         pack._layout.take_back_pack(pack)
 
@@ -53,7 +53,7 @@ _MAX_FREE_BLOCKS = 4  # most free blocks in a pool
 
 @kernel
 def _lay_out(entries: Any, steps: Any, owners: Any, skipped: Any, blocks: Any, table: Any) -> int:
-    """Fill the table of the arrays in some blocks, and return the address of the table."""
+    """Write the addresses and shapes of the arrays to a table, and return the address of the table."""
     for k in range(entries.shape[0]):
         for i in range(entries.shape[1]):
             table[k, i] = entries[k, i] + skipped[k] * steps[k, i]
@@ -118,12 +118,12 @@ class ArrayLayout:
         return np.empty(self._sizes[k], dtype=np.uint8) if pool is None else pool.block()
 
     def take_back(self, block: np.ndarray) -> None:
-        """Return an unused block to the layout, which uses it for the next call."""
+        """Take back a memory block that is no longer used, for the next call."""
         if len(self._returned) < _RETURNED:
             self._returned.append(block)
 
     def packed(self, blocks: tuple[np.ndarray, ...], skipped: tuple[int, ...]) -> list[Any]:
-        """Return packs of the arrays of each named tuple; `skipped` rows are omitted at the start."""
+        """Return the arrays of each named tuple as a pack, without the first rows that `skipped` counts."""
         packs: list[Any] = []
         if not ENABLED:
             arrays = iter(zip(self.rows(blocks), skipped, strict=True))
@@ -153,7 +153,7 @@ class ArrayLayout:
         return LayoutPack(self, blocks, table, self._types[0][0], address)
 
     def take_back_pack(self, pack: Any) -> None:
-        """Store a pack of small arrays, which `release` returns."""
+        """Store the arrays of a released pack for reuse, if they are small."""
         if len(self._released) < _RETURNED and self._sizes[0] < _LARGE:
             self._released.append(pack)
 
@@ -166,7 +166,7 @@ class ArrayLayout:
         return sum(self._sizes)
 
     def rows(self, blocks: tuple[np.ndarray | None, ...]) -> Any:
-        """Return the arrays, with None for the arrays of missing blocks."""
+        """Return the arrays in some memory blocks; an array whose block is missing is None."""
         return self._kind(
             *[
                 None if blocks[k] is None else np.ndarray(shape, dtype, blocks[k], offset)
@@ -181,7 +181,7 @@ class ArrayLayout:
 
 
 class BufferPool:
-    """A pool of blocks of one size in bytes, each of which is reused when all arrays in it have been deleted.
+    """A pool of memory blocks of one size; a block is reused when no array uses it any more.
 
     The operating system maps a fresh block page by page, when it is first written. In a compiled loop this can cost a
     sixth of the time of a run of thousands of steps.

@@ -51,7 +51,7 @@ if ENABLED:
             def __getattr__(self, name: str) -> Any: ...
 
     class PackType(types.Type):
-        """The numba type of a packed tuple: its name, and the name and the numba type of each field."""
+        """The numba type of a packed tuple, with the name and the type of each field."""
 
         def __init__(self, title: str, fields: tuple[tuple[str, Any], ...]) -> None:
             self.title, self.fields = title, fields
@@ -61,7 +61,7 @@ if ENABLED:
             super().__init__(name=f"Pack({title}, {digest})")
 
         def place(self, name: str) -> int:
-            """Return the place of a field in the table of a pack, which is the place of its address."""
+            """Return the row of the address table that belongs to a field."""
             return self._rows[name]
 
     @cache
@@ -126,21 +126,21 @@ if ENABLED:
 
     @intrinsic
     def pack_at(typingctx: Any, address: Any, like: Any) -> Any:
-        """Return a pack of the type of `like` for the table at an address."""
+        """Return the pack whose table is at an address; `like` gives its type."""
         return like(types.int64, like), lambda context, builder, signature, arguments: arguments[0]
 
     def opaque(pack: Any) -> Any:
-        """Return the address of a pack, for a kernel that only passes the pack to other kernels."""
+        """Return a pack as a plain address, for kernels that do not read its arrays."""
         return pack.address
 
     def address_in(pack: Any, name: str) -> np.ndarray:
-        """Return the place (1,) in the table of a pack that contains the address of a field."""
+        """Return the table entry (1,) that holds the address of a field."""
         row = pack.numba_type.place(name)
         place: np.ndarray = pack.table[row : row + 1]
         return place
 
     def replaced(pack: Any, **inner: Any) -> Any:
-        """Replace packs inside a pack by other packs, and return the pack; no kernel may be using the pack."""
+        """Replace packs inside a pack, and return the pack; no kernel may be using it."""
         for name, other in inner.items():
             if getattr(pack, name) is not other:
                 address_in(pack, name)[0] = other.address
@@ -162,12 +162,12 @@ else:
         raise NotImplementedError
 
     def replaced(pack: Any, **inner: Any) -> Any:
-        """Return a named tuple in which other tuples are replaced."""
+        """Return a copy of a named tuple with some inner tuples replaced."""
         return pack._replace(**inner)
 
 
 def packed(arrays: Any) -> Any:
-    """Return a named tuple of arrays as a pack for kernels, or unchanged if the compiler is off."""
+    """Pack the arrays of a named tuple for kernels; return the tuple unchanged if the compiler is off."""
     if not ENABLED:
         return arrays
     entries: list[int] = []

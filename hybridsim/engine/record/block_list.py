@@ -86,7 +86,7 @@ class BlockList(Sequence[Item]):
             self.blocks[0] = self.blocks[0].since(count)
 
     def mark(self) -> tuple[int, int]:
-        """Return the position after the last item, for `since_mark`."""
+        """Return the present end of the list, for a later call of `since_mark`."""
         blocks = self.blocks
         return self.forgotten + len(blocks), len(blocks[-1]) if blocks else 0
 
@@ -97,7 +97,7 @@ class BlockList(Sequence[Item]):
         return rest + sum(map(len, self.blocks[max(number, 0) :]))
 
     def without_last(self, count: int) -> list[Any]:
-        """Return a list without the last `count` items; other items can be added to this list."""
+        """Return a copy of the list without its last `count` items."""
         blocks = list(self.blocks)
         while blocks and count >= len(blocks[-1]):
             count -= len(blocks.pop())

@@ -21,7 +21,7 @@ Item = TypeVar("Item", covariant=True)
 
 
 class Block(Protocol[Item]):
-    """Consecutive items of a run, with indices from 0 to the length minus one."""
+    """Consecutive segments or events of a run, with indices from 0."""
 
     def __len__(self) -> int: ...
     def __getitem__(self, i: int, /) -> Item: ...

@@ -210,7 +210,7 @@ def quiet(
 def _before(
     sample: Callable[[np.ndarray], np.ndarray], theta: float, side: int, rounding: Callable[[], float]
 ) -> float:
-    """Return a point before theta at which the function certainly has the sign `side`, or theta.
+    """Return a point before theta at which the function certainly has the sign `side`; if none is found, return theta.
 
     The sign of the leading coefficient is known. If the coefficient is within the error bound of the
     polynomial, a zero close to the start is lost, and only the function's values give information.

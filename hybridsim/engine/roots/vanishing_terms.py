@@ -68,7 +68,7 @@ def _sizes(u: Any, order: int, h: float) -> tuple[float, float, float]:
 
 @inlined
 def may_end(u: Any, kind: int, size: float) -> bool:
-    """Return whether a function of u may limit the step, according to a fast test."""
+    """Return whether a function of the polynomial u may limit the step, by a fast test."""
     return kind == ROOT or size - abs(u[0]) > _SEEN
 
 

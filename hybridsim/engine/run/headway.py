@@ -128,7 +128,7 @@ class Headway:
             )
 
     def _fades(self, now: Instant, spent: float, left: float) -> bool:
-        """Return whether a run that is far from its end advanced only a little while its cost doubled several times."""
+        """Return whether a run that is far from its end has almost stopped, although its cost doubled several times."""
         self._cost += spent
         if self._cost < self._twice:
             return False

@@ -31,7 +31,7 @@ _DIRECTIONS = {"up": 1, "down": -1, "both": 0}
 
 @dataclass(frozen=True)
 class PassedMonitor:
-    """A crossing of a monitor that did not end the segment."""
+    """A zero crossing of a monitor inside a segment."""
 
     s: float  # local time
     x: np.ndarray  # states (n,)

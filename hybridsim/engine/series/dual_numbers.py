@@ -162,7 +162,7 @@ def differentiated(function: FunctionType) -> Callable[..., Any]:
 
 
 def differentiated_rows(function: FunctionType) -> Callable[..., Any]:
-    """Return a generated function that accepts dual numbers of k values each, with derivatives (D, k).
+    """Return a generated function in a form that accepts dual numbers with k values each.
 
     It raises `ValueError` if a condition does not hold for all k values or for none of them.
     """

@@ -47,7 +47,7 @@ class Registers:
         self._rounded: tuple[bytes, Inputs] | None = None  # last values of parameters, and their inputs
 
     def with_roundoff(self, p: np.ndarray) -> Inputs:
-        """Return the inputs with the rounding error of each number."""
+        """Return the numbers that a tape reads, with the rounding error of each."""
         known: Inputs = self.inputs
         values_now = p[known.sources]
         key, last = values_now.tobytes(), self._rounded
@@ -59,7 +59,7 @@ class Registers:
         return inputs
 
     def rounded(self) -> tuple[Inputs, np.ndarray]:
-        """Return inputs with parameters as constants, and their array of values and error bounds, which `fill` sets."""
+        """Return the numbers that a tape reads, with error bounds; parameters count as constants."""
         known: Inputs = self.inputs
         values = np.zeros((len(known.constants) + len(known.parameters), 2))
         values[: len(known.constants), 0] = known.values[:, 0]

@@ -40,7 +40,7 @@ class TapeBuilder:
         return self.registers[name]
 
     def rows(self, assignments: list[tuple[str, Any]], known: dict[Any, int]) -> list[tuple[int, ...]]:
-        """Return rows that compute each expression in the register of its name."""
+        """Return instruction rows that compute each expression and copy it to the register of its name."""
         rows: list[tuple[int, ...]] = []
         for name, expression in assignments:
             source = self._emit(expression, known, rows)
@@ -280,7 +280,7 @@ class TapeBuilder:
 
 
 def _with_exponential(base: Any) -> tuple[Any, Any, Any] | None:
-    """Return (c, d, u) of a sum c + d e^u in which c contains no exponential, or None."""
+    """Split a sum into c + d e^u, where c contains no exponential; return None if this is impossible."""
     import sympy as sp
 
     if not base.is_Add:
@@ -298,7 +298,7 @@ def _with_exponential(base: Any) -> tuple[Any, Any, Any] | None:
 
 
 def _grows_without_bound(base: Any, exponent: Any) -> bool:
-    """Return whether a power is the reciprocal of a base that contains an unbounded exponential."""
+    """Return whether a power has a negative exponent and a base that grows exponentially."""
     import sympy as sp
 
     is_below = exponent.is_Integer and exponent.is_negative

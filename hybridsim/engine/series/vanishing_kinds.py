@@ -18,5 +18,5 @@ def register_of(number: int) -> int:
 
 @inlined
 def power_of(number: int) -> int:
-    """Return the largest power of a function that may vanish."""
+    """Return the power that the code of a vanishing function contains."""
     return number // KINDS % MAX_POWER + 1

@@ -75,7 +75,7 @@ class KnownTimes(NamedTuple):
         )
 
     def of_like_lengths(self) -> KnownTimes:
-        """Return the known times up to the first time at which pieces of another order of magnitude begin."""
+        """Return the known times up to the first input interval of another order of magnitude."""
         m = int(np.argmax(self.lengths != self.lengths[0]))
         if m == 0:
             return self

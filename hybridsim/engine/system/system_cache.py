@@ -16,7 +16,7 @@ _lock = SharedLock()
 
 
 def runs_of(model: Model) -> dict[Any, Any]:
-    """Return the prepared runs of a model, for `hybridsim.preparation`; they are discarded with the model's system."""
+    """Return the stored settings of runs of a model; they are discarded with the model's system."""
     # a system keeps its model alive, so no other object has the same id
     known = _systems.get(id(model))
     return {} if known is None else known[1]

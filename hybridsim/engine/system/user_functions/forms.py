@@ -31,7 +31,7 @@ class Scalar(NamedTuple):
 
 @dataclass(frozen=True)
 class Parts:
-    """The functions of a model in the order of the engine.
+    """The Python functions of a model, sorted by their use.
 
     flows: (mode or -1, function), with the flow of the model last. component: the one whose modes have their own flows.
     """
