@@ -123,7 +123,7 @@ class Settling:
         return found if next(shorter, None) is None else None
 
     def _follow(self, step: Callable[[], Any]) -> Any:
-        """Follow the motion for one period by calling `step`, store the states, and return what `step` returned."""
+        """Follow the motion for one period by a call of `step`, store the states, and return the result of the call."""
         before = self.map.x
         found = step()
         self._states.append(self.map.x)

@@ -98,7 +98,7 @@ class MatrixTemplate:
         return {(), *(m for mode in read for m in mode.monomials())}
 
     def matrices(self, registers: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return A (K, m, m) of the flows y' = A y, the rows (K, G, m) of the guards, and a mask of the usable modes.
+        """Return the matrices A of the flows y' = A y, the coefficients of the guards, and a mask of the usable modes.
 
         registers (points, R): the matrices of all points are stacked along the first axis. See `leave_out`.
         """

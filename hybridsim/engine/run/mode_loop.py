@@ -280,7 +280,7 @@ class ModeLoop:
     def _run_compiled(
         self, compiled_loop: CompiledLoop, target: Instant, appointment: Appointment | None
     ) -> tuple[bool, bool]:
-        """Run in compiled code until an event is not ordinary; return (target was reached, run stops).
+        """Run in compiled code up to the target, or up to an event that is not ordinary.
 
         Without a renewal the target is the first known time that the loop cannot pass.
         """
