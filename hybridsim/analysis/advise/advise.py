@@ -218,7 +218,7 @@ def _chosen(names: Sequence[str] | None) -> tuple[LadderStep, ...]:
 
 
 class _ProgressReport:
-    """Report to the progress callback which item begins, and repeat the report during long items."""
+    """Reports to the progress callback which computation begins, and repeats the report during long computations."""
 
     def __init__(self, progress: Progress | bool | None, total: int) -> None:
         self._progress, self._total, self._done = arguments.callback(progress), total, -1

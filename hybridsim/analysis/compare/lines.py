@@ -1,4 +1,4 @@
-"""This module chooses the runs of a comparison: each line is an integrator with several settings."""
+"""This module chooses the runs of a comparison: series of runs of one integrator with several settings."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _PERIODS = 10  # periods assumed for a run without a period, if the step is a fr
 
 @dataclass(frozen=True)
 class Series:
-    """One line of a comparison: an integrator with one varied option.
+    """One series of runs in a comparison: an integrator with several values of one option.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ def _line(
 
 
 def _shown_unasked(name: str) -> list[tuple[Mapping[str, Any], str]]:
-    """Return the options and the label of each default line of an integrator."""
+    """Return the options and the label of each default series of an integrator."""
     if name in _ALSO_NATIVE:
         return [({}, ""), ({"events": "native"}, f"{name}, native events")]
     if name != "rk4-dichotomy":

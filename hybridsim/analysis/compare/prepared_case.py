@@ -41,7 +41,7 @@ class PreparedCase:
         return simulate(model or self.model, self.t_span, integrator=integrator, **options)
 
     def call(self, line: Series, value: float) -> Callable[[], Solution]:
-        """Return a function that makes one run of a line at one setting, so that the run can be timed."""
+        """Return a function that makes one run of a series at one setting, so that the run can be timed."""
         model, options = self._form(line, value), line.options_at(value)
         return lambda: self.simulate(line.integrator, model=model, **options)
 
@@ -95,7 +95,7 @@ class PreparedCase:
         )
 
     def _form(self, line: Series, value: float) -> Model | None:
-        """Return the regularised model of a line, or None if the line uses the model itself."""
+        """Return the regularised model of a series, or None if the series uses the model itself."""
         if not line.regularized:
             return None
         key = (line.regularized, value)

@@ -94,7 +94,7 @@ def as_set_valued(run: Trajectory, contacts: Collection[str]) -> Trajectory:
 
 
 def exponents(rows: Sequence[Row]) -> Mapping[str, tuple[float | None, float | None]]:
-    """Return the exponents p of error ~ v0^p and work ~ v0^p of each line over v0, or None for an unknown exponent.
+    """Return the exponents p of error ~ v0^p and of work ~ v0^p for each series; an unknown exponent is None.
 
     They are fitted by least squares of the logarithms over the three smallest v0 that ran. For the error only
     those count whose error is at least three times that of the same integrator on the set-valued law at the

@@ -1,4 +1,4 @@
-"""This module writes the parts of a comparison as text: settings, times, versions and lines of cells."""
+"""This module writes the parts of a comparison as text: settings, times, versions and rows of a table."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def failure_of(row: Row) -> str:
 
 
 def aligned_cells(cells: tuple[str, ...], widths: list[int]) -> str:
-    """Return the cells of one line of the table as text, with numbers aligned to the right."""
+    """Return the cells of one row of the table as text, with numbers aligned to the right."""
     first, *numbers, last = cells
     inner = [cell.rjust(width) for cell, width in zip(numbers, widths[1:])]
     return "  ".join([first.ljust(widths[0]), *inner, last])

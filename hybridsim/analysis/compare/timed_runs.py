@@ -58,7 +58,7 @@ class _Run:
 def timed_rows(
     entries: Sequence[Entry], repeat: int, budget: Budget, step: Callable[[str], None]
 ) -> list[tuple[Row, ...]]:
-    """Make all runs, and return the rows of each entry, sorted like its lines.
+    """Make all runs, and return the rows of each entry in the order of its series.
 
     First everything is run once, the loosest setting of every line before the second of any. The time of the
     next setting of a line is predicted from its last two. A run that would take more than ten times its equal
@@ -113,7 +113,7 @@ def timed_rows(
 
 
 def _predicted(entries: Sequence[Entry], rows: dict[_Run, Row], run: _Run) -> float:
-    """Return the seconds of a run, predicted from two looser settings of its line, or 0 without a prediction."""
+    """Return the seconds of a run, predicted from two looser settings of its series, or 0 without a prediction."""
     before = [rows[replace(run, level=level)] for level in range(run.level)]
     done = [(row.setting[1], row.cost) for row in before if row.cost is not None]
     if any(row.status == STOPPED for row in before):

@@ -120,7 +120,7 @@ class Orbit:
 
     @cached_property
     def turns(self) -> Turns:
-        """The extrema inside the pieces, at which the slope of a quantity changes its sign."""
+        """The extrema inside the intervals, at which the slope of a quantity changes its sign."""
         found = [self._turns_of(*block) for block in self._blocks()]
         return Turns(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
 

@@ -99,7 +99,7 @@ def first_passage(orbit: Orbit, level: float, sign: float) -> float:
 
 
 def _knots(orbit: Orbit) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return points in order of time between which a quantity is monotone: piece, local time, and value."""
+    """Return points in order of time between which a quantity is monotone: interval, local time, and value."""
     smooth, turns = orbit.is_smooth[:, 0], orbit.turns
     numbers = np.arange(len(smooth))
     ends = orbit.series(orbit.names[0])[smooth] @ legendre.legvander(_ENDS, len(NODES) - 1).T

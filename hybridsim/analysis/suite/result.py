@@ -88,7 +88,7 @@ class SuiteComparison(Readable):
         return tuple(dict.fromkeys(label for result in self.results for label in result.comparison.labels))
 
     def verdicts(self) -> dict[str, dict[str, Verdict]]:
-        """Return the verdict for each scene and line at a common tolerance."""
+        """Return the verdict for each scene and series at a common tolerance."""
         return {
             result.scene.name: {
                 label: verdict(result.scene, [row for row in result.comparison.rows if row.label == label])

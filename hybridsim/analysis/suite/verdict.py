@@ -33,7 +33,7 @@ class Verdict(Enum):
 
 
 def verdict(scene: Scene, rows: Sequence[Row]) -> Verdict:
-    """Return the verdict on a line at the setting that is closest to the common setting.
+    """Return the verdict on a series of runs, at the setting that is closest to the common setting.
 
     "off": the modes are right, but a state is wrong by more than a tenth of its amplitude. "lacks": the modes
     are wrong, and the integrator declares that it lacks a capability that the scene needs.

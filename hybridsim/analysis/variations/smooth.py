@@ -122,7 +122,7 @@ def divided(slopes: NumberedSlopes, steps: Steps, fastest: float) -> tuple[Steps
 
 
 def transitions(slopes: NumberedSlopes, steps: Steps, scale: np.ndarray, constants: np.ndarray) -> Intervals:
-    """Return the derivatives over pieces of segments, which are halved until they are resolved.
+    """Return the derivatives over parts of segments, which are halved until they are resolved.
 
     scale (n,), constants (q,): sizes of the states and of the constants, all positive.
     """
@@ -166,7 +166,7 @@ class _Stops:
 def _speeds(
     slopes: NumberedSlopes, number: np.ndarray, begins: np.ndarray, ends: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the fastest decay rate (K,), and the largest absolute eigenvalue (K,), in the middle of each piece."""
+    """Return the fastest decay rate (K,), and the largest absolute eigenvalue (K,), in the middle of each part."""
     found = slopes(number, 0.5 * (begins + ends))
     A = found[:, :, : found.shape[1]]
     finite = np.asarray(np.isfinite(A).all(axis=(1, 2)))
@@ -219,7 +219,7 @@ def stiff_transitions(
 def over_intervals(
     slopes: NumberedSlopes, steps: Steps, scale: np.ndarray, constants: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the derivatives over each piece, and a measure of how well each piece is resolved."""
+    """Return the derivatives over each part, and a measure of how well each part is resolved."""
     number, begins, ends = steps
     lengths = ends - begins
     at = np.repeat(number, _STAGES)

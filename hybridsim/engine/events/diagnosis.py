@@ -128,7 +128,7 @@ def _steep(
     first: np.ndarray,
     reach: float,
 ) -> str:
-    """Return which values are too large or change too fast for any step, or an empty text."""
+    """Name the values that are too large or change too fast for any step, or return an empty text."""
     found = [
         f"{system.names[i]} = {x[i]:.3g} is too large to be squared"
         for i in np.flatnonzero(np.abs(x) > _SQUARED)
@@ -157,7 +157,7 @@ def _steep(
 
 
 def power_without_value(system: System, names: list[str], t: float, x: np.ndarray) -> str:
-    """Return which root or fractional power in the rates is undefined at a state, with a remedy."""
+    """Name a root or fractional power in the rates that is undefined at a state, with a remedy."""
     from hybridsim.model.smoothing.nonsmooth import roots_in
 
     model = system.model
@@ -178,7 +178,7 @@ def power_without_value(system: System, names: list[str], t: float, x: np.ndarra
 
 
 def _power_without_series(system: System, x: np.ndarray, ahead: np.ndarray) -> str:
-    """Return which power has no Taylor series at x <= 0, with a remedy."""
+    """Name a power without a Taylor series at x <= 0, with a remedy."""
     from hybridsim.model.smoothing.nonsmooth import roots_in
 
     model = system.model
@@ -203,7 +203,7 @@ def _power_without_series(system: System, x: np.ndarray, ahead: np.ndarray) -> s
 
 
 def _division_by_zero(system: System, names: list[str], x: np.ndarray) -> str:
-    """Return which denominator in the rates is zero in every mode, or an empty text."""
+    """Name a denominator in the rates that is zero in every mode, or return an empty text."""
     if system.model.flow is not None:
         return ""
     lookup = Meanings(system.model).lookup

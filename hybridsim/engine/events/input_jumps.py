@@ -18,7 +18,7 @@ _JOINED = 3.0  # ulps within which times count as equal, as in `hybridsim.engine
 
 
 def surfaces_jump(system: System, instant: Instant, at: Situation, forward: bool) -> bool:
-    """Return whether surfaces, or rates of closed gaps, jump at an instant at which inputs begin new pieces.
+    """Return whether surfaces, or rates of closed gaps, jump at an instant at which inputs jump.
 
     Times that are equal within rounding count as one, at the last of them. The pieces before are those before all of
     them.
@@ -32,7 +32,7 @@ def surfaces_jump(system: System, instant: Instant, at: Situation, forward: bool
 
 
 def vectors_jump(system: System, at: Situation, before: np.ndarray, s_error: float = 0.0) -> bool:
-    """Return whether surfaces, or rates of closed gaps, differ between the run-time vectors before and at an event."""
+    """Return whether surfaces, or rates of closed gaps, change if inputs and discrete states jump at an event."""
     z = np.maximum(at.z, 0)
     return bool(system.surface_of) and _differ(system, at, ((before, z), (at.p.copy(), z)), s_error)
 
@@ -48,7 +48,7 @@ def gaps_jump(system: System, at: Situation, before: np.ndarray, after: np.ndarr
 def _differ(
     system: System, at: Situation, sides: Sequence[tuple[np.ndarray, np.ndarray]], s_error: float = 0.0
 ) -> bool:
-    """Return whether surfaces or gap rates differ between two run-time vectors and modes at one state."""
+    """Return whether surfaces or gap rates change at one state, if run-time values and modes change."""
     values, bounds = [], []
     for p, z in sides:
         p[system.layout.pin_at] = 0.0

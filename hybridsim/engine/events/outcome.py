@@ -60,7 +60,7 @@ class Outcome:
     warnings: list[str] = field(default_factory=list)
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """Return by name the arrays that a run needs to continue from this outcome."""
+        """Return by name the arrays that a run needs to continue from this state."""
         state = {name: getattr(self, name) for name in _STATE}
         return state | {"continuous": np.array(self.continuous)}
 

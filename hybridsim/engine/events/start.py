@@ -29,7 +29,7 @@ _MAX_CACHED_STARTS = 64
 
 
 def settled_start(system: System, task: Task, origin: Instant, due: tuple[int, ...]) -> Outcome:
-    """Return the outcome just after the start of the run, after schedules that are due at the start."""
+    """Return the state just after the start of the run, after schedules that are due at the start."""
     key = task.beginning
     known = system.starts.get(key)
     if known is None:

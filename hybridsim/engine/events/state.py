@@ -67,7 +67,7 @@ class HybridState:
 
     @classmethod
     def of(cls, outcome: Outcome, p: np.ndarray) -> HybridState:
-        """Return the state of an outcome with the run-time vector `p`."""
+        """Return the state of a finished event, with the run-time vector `p`."""
         fields = StateArrays(
             outcome.x, outcome.x_error, p, outcome.guard_floors, outcome.z, outcome.sides, outcome.orders
         )

@@ -116,7 +116,7 @@ class ClosedFormBlock(SegmentBlock):
         return index, self.spans.ravel(), self.jumps[:, :2].reshape(len(index), -1)
 
     def since(self, first: int) -> ClosedFormBlock:
-        """Return the block of the segments from a given number on."""
+        """Return a block of the segments, starting with the segment of a given number."""
         rows = (self.rows, self.ends, self.coordinates, self.origins, self.modes, self.vectors, self.jumps)
         return ClosedFormBlock(self.system, self.tables, *(r[first:] for r in rows))
 

@@ -34,7 +34,7 @@ def number(value: float) -> str:
 
 
 class Lines:
-    """The lines of one function, in which each value is computed once."""
+    """The lines of code of one function, in which each value is computed once."""
 
     def __init__(self, prefix: str = "v") -> None:
         self.lines: list[str] = []
@@ -91,6 +91,6 @@ class Lines:
 
 
 def function(name: str, lines: Iterable[str]) -> str:
-    """Return the text of a function that consists of the lines so far."""
+    """Return the text of a function that consists of the lines of code so far."""
     arguments = "double %s, double %e, ptr noalias %x, ptr noalias %g, ptr noalias %c, ptr noalias %out"
     return "\n".join((f"define void @{name}({arguments}) {{", *lines, "  ret void", "}", ""))

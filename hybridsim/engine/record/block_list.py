@@ -37,7 +37,7 @@ class BlockList(Sequence[Item]):
         self.forgotten = 0  # number of discarded blocks
 
     def append(self, item: Item) -> None:
-        """Add one item, a segment or an event."""
+        """Add one segment or event."""
         if self.window is None and not self._least:
             return
         limit = math.inf if self.window == math.inf else max(_LOOSE, self._least // 4)
@@ -48,12 +48,12 @@ class BlockList(Sequence[Item]):
         self._forget()
 
     def extend(self, items: Iterable[Item]) -> None:
-        """Add several items, segments or events."""
+        """Add several segments or events."""
         for item in items:
             self.append(item)
 
     def add(self, block: Block[Item]) -> None:
-        """Add a block of items."""
+        """Add a block of segments or events."""
         if (self.window is not None or self._least) and len(block):
             self.blocks.append(block)
             if len(self.blocks) > 1:
@@ -72,14 +72,14 @@ class BlockList(Sequence[Item]):
             self.forgotten += 1
 
     def set_end(self, item: Item) -> None:
-        """Replace all stored items by one item."""
+        """Replace all stored segments or events by one."""
         self.forgotten += len(self.blocks)
         last = self._loose()
         last.append(item)
         self.blocks = [last]
 
     def drop(self, count: int) -> None:
-        """Discard a number of items at the start."""
+        """Discard a number of segments or events at the start."""
         while self.blocks and count >= len(self.blocks[0]):
             count -= len(self.blocks.pop(0))
         if count:
@@ -91,13 +91,13 @@ class BlockList(Sequence[Item]):
         return self.forgotten + len(blocks), len(blocks[-1]) if blocks else 0
 
     def since_mark(self, mark: tuple[int, int]) -> int:
-        """Return how many items were added after a mark."""
+        """Return how many segments or events were added after a mark."""
         number, length = mark[0] - self.forgotten, mark[1]
         rest = len(self.blocks[number - 1]) - length if number > 0 else 0
         return rest + sum(map(len, self.blocks[max(number, 0) :]))
 
     def without_last(self, count: int) -> list[Any]:
-        """Return a copy of the list without its last `count` items."""
+        """Return a copy of the list without its last `count` segments or events."""
         blocks = list(self.blocks)
         while blocks and count >= len(blocks[-1]):
             count -= len(blocks.pop())
@@ -112,7 +112,7 @@ class BlockList(Sequence[Item]):
         return blocks
 
     def starts(self) -> np.ndarray:
-        """Return the index of the first item of each block, followed by the number of items."""
+        """Return the index of the first segment or event of each block, followed by the total number."""
         return np.cumsum([0, *map(len, self.blocks)])
 
     def __bool__(self) -> bool:

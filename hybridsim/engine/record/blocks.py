@@ -1,4 +1,4 @@
-"""This module stores segments and events of a run in blocks: lists of items, or arrays of many items.
+"""This module stores segments and events of a run in blocks: lists of objects, or arrays.
 
 A compiled loop passes hundreds of events in the time in which Python makes a few objects. It commits one block of
 segments and one of events for each of its calls, with the arrays that it wrote. Objects are made on demand.
@@ -29,10 +29,10 @@ class Block(Protocol[Item]):
 
     @property
     def until(self) -> Instant:
-        """Return the instant of the last item: the end of a segment, or the time of an event."""
+        """Return the end of the last segment, or the time of the last event."""
 
     def since(self, first: int) -> Block[Item]:
-        """Return a block of the items from a given number on."""
+        """Return a block of the segments or events, starting with a given number."""
 
 
 class SegmentBlock(Sequence[Segment]):
@@ -69,7 +69,7 @@ class SegmentBlock(Sequence[Segment]):
 
     @abstractmethod
     def since(self, first: int) -> SegmentBlock:
-        """Return a block of the segments from a given number on."""
+        """Return a block of the segments, starting with the segment of a given number."""
 
     @property
     @abstractmethod
@@ -156,7 +156,7 @@ class SegmentList(list[Segment]):
         return index, np.concatenate(s), np.concatenate(x)
 
     def since(self, first: int) -> SegmentList:
-        """Return a block of the segments from a given number on."""
+        """Return a block of the segments, starting with the segment of a given number."""
         return SegmentList(self._system, self[first:])
 
 
@@ -190,12 +190,12 @@ class OccurrenceList(list[Occurrence]):
         return Counter(o.kind for o in self)
 
     def transitions(self, first: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return instants (k, 2) and states (k, 2, n) of the transitions from a given event on."""
+        """Return instants (k, 2) and states (k, 2, n) of the transitions, starting with a given event."""
         chosen = [o for o in self[first:] if o.kind == "transition"]
         if not chosen:
             return np.empty((0, 2)), np.empty((0, 2, 0))
         return np.array([o.instant for o in chosen]), np.array([(o.x_minus, o.x_plus) for o in chosen])
 
     def since(self, first: int) -> OccurrenceList:
-        """Return a block of the events from a given number on."""
+        """Return a block of the events, starting with the event of a given number."""
         return OccurrenceList(self[first:])

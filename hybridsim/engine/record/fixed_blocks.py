@@ -120,7 +120,7 @@ class StepSegments(SegmentBlock):
         return self._s[rows], self._x[rows], self.vectors[i], self.modes[i]
 
     def since(self, first: int) -> StepSegments:
-        """Return a block of the segments from a given number on."""
+        """Return a block of the segments, starting with the segment of a given number."""
         later = copy(self)
         for name in ("_first", "_last", "origins", "vectors", "modes"):
             setattr(later, name, getattr(self, name)[first:])

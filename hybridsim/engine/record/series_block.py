@@ -156,7 +156,7 @@ class SeriesBlock(SegmentBlock):
         return index, s, self.states(index, s)
 
     def since(self, first: int) -> SeriesBlock:
-        """Return a block of the segments from a given number on."""
+        """Return a block of the segments, starting with the segment of a given number."""
         return self._part(first, len(self))
 
     def _part(self, first: int, last: int) -> SeriesBlock:

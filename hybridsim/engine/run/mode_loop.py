@@ -81,7 +81,7 @@ class ModeLoop:
 
     @property
     def outcome(self) -> Outcome:
-        """Return the outcome of the last event at the origin of the segment."""
+        """Return the state after the last event, at the origin of the segment."""
         return self.lazy_state.outcome
 
     @property

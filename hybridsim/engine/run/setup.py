@@ -46,7 +46,7 @@ class LazyState:
 
     @cached_property
     def outcome(self) -> Outcome:
-        """Return the outcome of the last event."""
+        """Return the state after the last event."""
         return self._make()
 
     @cached_property
@@ -55,7 +55,7 @@ class LazyState:
         return self._system.vector(self._instant, self._system.discrete(self.outcome.p), self._forward)
 
     def read(self) -> tuple[Outcome, np.ndarray]:
-        """Return the outcome and the run-time vector for reading; the caller must not modify them."""
+        """Return the state and the run-time values for reading; the caller must not modify them."""
         return self._shared or (self.outcome, self.p)
 
 
@@ -120,7 +120,7 @@ class RunSetup:
         return LazyState(self.system, self.origin, task.forward, settled[0].copy, settled)
 
     def _at_start(self, task: Task, due: tuple[int, ...]) -> tuple[Outcome, np.ndarray]:
-        """Return the outcome and the run-time vector at the start."""
+        """Return the state and the run-time values at the start."""
         system, forward = self.system, task.forward
         if self._start is None and self._buffer is not None:
             self._start = self._buffer.copy().outcome(), self._buffer.p

@@ -44,7 +44,7 @@ class Layout:
 
     @cached_property
     def signals_at(self) -> int:
-        """Return the offset of the coefficients of the current piece of each input."""
+        """Return the offset of the present coefficients of each input."""
         return self.phases_at + self.phases
 
     @cached_property

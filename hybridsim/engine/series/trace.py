@@ -134,7 +134,7 @@ class Coefficients:
 
 
 class Trace(Lines):
-    """The lines of one generated function, written by kernels that run on symbolic values.
+    """The lines of code of one generated function, written by kernels that run on symbolic values.
 
     Parameters
     ----------

@@ -90,7 +90,7 @@ class KnownTimes(NamedTuple):
         )
 
     def since(self, first: int) -> KnownTimes:
-        """Return the known times from a given number on."""
+        """Return the known times, starting with the time of a given number."""
         return self._replace(
             instants=self.instants[first:],
             kinds=self.kinds[first:],

@@ -1,4 +1,4 @@
-"""This module finds modes that the state alone determines: corners, jumps, and pieces of tables."""
+"""This module finds modes that the state alone determines: sides of corners and jumps, intervals of tables."""
 
 from __future__ import annotations
 

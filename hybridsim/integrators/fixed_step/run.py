@@ -42,7 +42,7 @@ ROWS = 8192  # most steps per kernel call; each call has a new time origin, so t
 
 
 def _left(before: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """Return which monitors leave their side in a step, by `leaves_side`."""
+    """Return a mask of the monitors that leave their side in a step, by `leaves_side`."""
     return ((before > 0.0) & (after <= 0.0)) | ((before < 0.0) & (after >= 0.0))
 
 
@@ -312,7 +312,7 @@ class FixedStepRun:
         return self.system.rows("monitors", len(names), np.array([s]), x[None, :], free, self.z)[0]
 
     def _turning_back(self, before: np.ndarray, after: np.ndarray) -> np.ndarray:
-        """Return which monitors are exactly zero at this instant and return to their previous side."""
+        """Return a mask of the monitors that are exactly zero at this instant and return to their previous side."""
         back = np.zeros(len(after), dtype=np.bool_)
         if (after == 0.0).any():  # use the inputs after this instant
             series = self.system.series(0.0, self.x, self._vector(), self.z, np.zeros(len(self.x)), 0.0)

@@ -169,7 +169,7 @@ class Extremes:
         return found
 
     def _plateaus(self) -> list[Place]:
-        """Return points of the pieces on which the quantity is constant."""
+        """Return points of the intervals on which the quantity is constant."""
         orbit = self._orbit
         return [
             Place(int(orbit.segments[k]), self._at(k, local), HELD, value, int(k))

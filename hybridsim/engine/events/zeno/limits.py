@@ -32,7 +32,7 @@ def behind(
 def _gathered(
     system: System, outcome: Outcome, p: np.ndarray, s: float, left: float, changed: tuple[int, ...]
 ) -> tuple[float, Outcome] | None:
-    """Return the outcome that holds surfaces and contacts at a limit of events, or None.
+    """Return the state that holds surfaces and contacts at a limit of events, or None if there is none.
 
     The limit is on the surfaces whose rates, or derivatives of rates, may bring them to zero within the time `left`,
     and in the contacts whose gaps and rates become zero in it. They are held from here on. On average, bounces that
@@ -90,7 +90,7 @@ def _moved(system: System, x: np.ndarray, p: np.ndarray, z: np.ndarray, s0: floa
 def _held_at(
     system: System, outcome: Outcome, p: np.ndarray, s: float, near: list[int], x: np.ndarray, z: np.ndarray
 ) -> Outcome | None:
-    """Return the outcome at local time `s` with nearby surfaces at zero, or None if there is no such outcome."""
+    """Return the state at local time `s` with nearby surfaces at zero, or None if there is no such state."""
     if not np.isfinite(x).all():
         return None
     z = z.copy()
@@ -129,7 +129,7 @@ def _at_the_end(
 def _at_declared_limit(
     system: System, outcome: Outcome, p: np.ndarray, s: float, changed: tuple[int, ...]
 ) -> tuple[float, Outcome] | None:
-    """Return the outcome in the declared limit modes of some components, or None if none is declared."""
+    """Return the state in the declared limit modes of some components, or None if no mode is declared."""
     entered = tuple(c for c in changed if c >= 0 and system.automata[c].limit >= 0)
     if not entered:
         return None
