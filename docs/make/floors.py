@@ -10,6 +10,7 @@ from __future__ import annotations
 import ast
 import hashlib
 import re
+import textwrap
 from collections import Counter
 from functools import cache
 from pathlib import Path
@@ -171,6 +172,12 @@ def drawn_from() -> str:
     return "floors " + hashlib.sha256(repr(shown).encode()).hexdigest()[:16]
 
 
+def purpose(floor: str) -> list[str]:
+    """The first sentence of a floor without its first two words, in lines that fit the picture."""
+    sentence = first_sentence(PACKAGE.joinpath(*floor.split("."))).replace("`", "")
+    return textwrap.wrap(re.sub(r"^This (package|module) ", "", sentence), 72)
+
+
 def draw() -> Path:
     """Draw the picture; returns where it went."""
     import matplotlib
@@ -182,7 +189,7 @@ def draw() -> Path:
     below, sizes = graph()
     drawn = [name for name in FLOORS if name != "engine.stepping"]  # an earlier path, deprecated
     row = {name: float(i) for i, name in enumerate(drawn)}
-    figure, axes = plt.subplots(figsize=(13, 12), layout="constrained")
+    figure, axes = plt.subplots(figsize=(8.8, 12), layout="constrained")  # inches: as wide as the text of a page
     for above, under in needed({name: below[name] for name in drawn}):
         gap = row[above] - row[under]
         if gap == 1.0:
@@ -205,11 +212,10 @@ def draw() -> Path:
             )
         )
         modules = "1 file" if sizes[name] == 1 else f"{sizes[name]} files"
-        axes.text(0.15, row[name], name, va="center", fontsize=11, weight="bold")
-        axes.text(WIDTH - 0.15, row[name], modules, va="center", ha="right", fontsize=9)
-        sentence = first_sentence(PACKAGE.joinpath(*name.split("."))).replace("`", "")
-        axes.text(WIDTH + 0.2, row[name], sentence, va="center", fontsize=9.5)
-    axes.set_xlim(-3.6, 13.0)
+        axes.text(0.15, row[name], name, va="center", fontsize=8.5, weight="bold")
+        axes.text(WIDTH - 0.15, row[name], modules, va="center", ha="right", fontsize=8)
+        axes.text(WIDTH + 0.15, row[name], "\n".join(purpose(name)), va="center", fontsize=8, linespacing=1.0)
+    axes.set_xlim(-2.6, 10.4)
     axes.set_ylim(-0.6, len(drawn) - 0.4)
     axes.axis("off")
     path = ROOT / "docs" / "images" / "floors.png"
