@@ -119,7 +119,4 @@ def library(name: str) -> Any:
     try:
         return import_module(name)
     except ImportError:
-        raise UsageError(
-            f"{name} is not installed",
-            remedy=f"run 'pip install {name}', or 'pip install hybridsim[tables]' for pandas and xarray",
-        ) from None
+        raise UsageError(f"{name} is not installed", remedy=f"run 'pip install {name}'") from None
