@@ -11,6 +11,7 @@ import hybridsim
 sys.path.insert(0, str(Path(__file__).parent / "make"))
 import figures
 import picture_links
+import search_words
 
 project, author = "hybridsim", "The hybridsim developers"
 project_copyright = "The hybridsim developers"
@@ -52,6 +53,7 @@ html_theme = "pydata_sphinx_theme"
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
 html_title = "hybridsim"
+html_search_scorer = str(Path(__file__).parent / "make" / "search_scorer.js")
 html_theme_options = {
     "navigation_with_keys": False,
     "show_prev_next": False,
@@ -61,10 +63,10 @@ html_theme_options = {
 
 
 def setup(app: Any) -> None:
-    """Say at the foot of each page with figures of which sources they are, and make pictures links."""
+    """Add the search words and the foot of each page, which states the sources of its figures; make pictures links."""
 
     def add(app: Any, name: str, source: list[str]) -> None:
-        source[0] += figures.footer(f"{name}.md")
+        source[0] = search_words.add(name, source[0]) + figures.footer(f"{name}.md")
 
     app.connect("source-read", add)
     app.connect("doctree-resolved", picture_links.add)

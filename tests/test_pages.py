@@ -180,6 +180,19 @@ def test_every_study_says_what_makes_its_figures(monkeypatch: pytest.MonkeyPatch
     assert figures["footer"]("tutorials/index.md") == ""
 
 
+def test_search_words_belong_to_headings_of_pages() -> None:
+    """Each page and heading of the table exists, and no two sections have one word, so that a search is clear."""
+    search = runpy.run_path(str(ROOT / "docs" / "make" / "search_words.py"))
+    table = search["words"]()
+    for page in table:
+        text = (ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8")
+        assert search["add"](page, text).count("```{index}") == sum(map(len, table[page].values()))
+    words = [word for headings in table.values() for found in headings.values() for word in found]
+    assert len(words) == len(set(words)) and all(word == word.lower() for word in words)
+    with pytest.raises(ValueError, match="has 0 headings 'Install"):
+        search["add"]("tutorials/faq", "# FAQ")
+
+
 def test_figures_depend_on_what_their_commands_use() -> None:
     """A page is older where a module that its command reaches has changed, through functions and packages too."""
     used = runpy.run_path(str(ROOT / "docs" / "make" / "used_sources.py"))["modules_of"]

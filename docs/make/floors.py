@@ -189,7 +189,9 @@ def draw() -> Path:
     below, sizes = graph()
     drawn = [name for name in FLOORS if name != "engine.stepping"]  # an earlier path, deprecated
     row = {name: float(i) for i, name in enumerate(drawn)}
-    figure, axes = plt.subplots(figsize=(8.8, 12), layout="constrained")  # inches: as wide as the text of a page
+    figure, axes = plt.subplots(
+        figsize=(8.8, 12), layout="constrained"
+    )  # inches: as wide as the text of a page
     for above, under in needed({name: below[name] for name in drawn}):
         gap = row[above] - row[under]
         if gap == 1.0:

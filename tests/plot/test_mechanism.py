@@ -125,6 +125,30 @@ def test_a_damper_stays_between_its_ends(speed: float) -> None:
         assert x.min() >= -canvas.layout.hatch - 1e-12 and x.max() <= 1.0 + speed * t + 0.2 + 1e-12
 
 
+CART = """
+name = "cart"
+[states]
+x = { start = 0, der = 1 }
+[drawing]
+ground = { kind = "ground", at = [0, 0] }
+cart = { kind = "mass", at = ["x", 0], size = [1, 0.5] }
+moving = { kind = "pendulum", at = ["x", 0.25], length = 3, angle = 0 }
+fixed = { kind = "pendulum", at = [0, 3], length = 1, angle = 0 }
+"""
+
+
+def test_a_ground_is_below_its_bodies_and_only_a_fixed_pivot_has_a_support() -> None:
+    """The bob of the moving pendulum hangs 2.75 below the ground, and moves the mean of the bodies below it."""
+    solution = hs.simulate(hs.Model.from_toml(CART), (0, 1))
+    layout = Canvas(solution, Window(0.0, 1.0), LIGHT).layout
+    strokes = {
+        name: [item for item in items_of(Frame({name: pose}, layout, LIGHT, {})) if item.line == LIGHT.weak]
+        for name, pose in poses_at(solution, np.array([0.5]))[0].items()
+    }
+    assert all(stroke.points[:, 1].max() <= 1e-12 for stroke in strokes["ground"])
+    assert strokes["ground"] and strokes["fixed"] and not strokes["moving"]
+
+
 def frames_of(path: Path) -> tuple[list[np.ndarray], list[int]]:
     """The pictures of a GIF and the time of each in milliseconds."""
     with Image.open(path) as image:

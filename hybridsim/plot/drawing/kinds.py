@@ -103,13 +103,8 @@ def _wheel(pose: Pose, frame: Frame) -> Items:
 def _pendulum(pose: Pose, frame: Frame) -> Items:
     unit, theme, bob = frame.layout.unit, frame.theme, bob_of(pose)
     radius = frame.layout.size(pose)[0] / 2
-    tip, foot = 0.3 * unit, 0.2 * unit
-    yield Outline(
-        pose.at + np.array([[0, 0], [-foot, tip], [foot, tip]]), theme.ink, 1.2, theme.paper, BEHIND
-    )
-    yield from _hatched(
-        pose.at + [0.38 * unit, tip], pose.at + [-0.38 * unit, tip], theme, theme.ink, frame.layout.hatch
-    )
+    if pose.shape.name in frame.layout.hung:
+        yield from _support(pose, frame)
     yield Outline(np.array([pose.at, bob]), theme.ink, 2.6, order=MIDDLE)
     yield Outline(circle(bob, radius), theme.ink, 1.4, theme.body)
     joint = frame.colour(pose, theme.ink)
@@ -121,6 +116,18 @@ def _pendulum(pose: Pose, frame: Frame) -> Items:
         FRONT,
     )
     yield from _text(pose, frame, bob)
+
+
+def _support(pose: Pose, frame: Frame) -> Items:
+    """Draw the fixed support above the pivot of a pendulum."""
+    unit, theme = frame.layout.unit, frame.theme
+    tip, foot = 0.3 * unit, 0.2 * unit
+    yield Outline(
+        pose.at + np.array([[0, 0], [-foot, tip], [foot, tip]]), theme.ink, 1.2, theme.paper, BEHIND
+    )
+    yield from _hatched(
+        pose.at + [0.38 * unit, tip], pose.at + [-0.38 * unit, tip], theme, theme.ink, frame.layout.hatch
+    )
 
 
 def _hatched(start: Points, end: Points, theme: Theme, line: str, depth: float, width: float = 1.6) -> Items:

@@ -16,6 +16,7 @@ Points = NDArray[np.float64]
 LINES = ("ground", "wall", "belt")  # kinds with a surface
 _HATCH = 0.035  # largest depth of hatching as a part of the extent
 _SHARE = 0.17  # default size of a body as a part of the extent of all places
+_TOUCH = 0.1  # largest distance between a body and the line on which it stands, relative to the unit
 _CLOSED = 0.8  # length of a closed damper as a part of its length when it is half open
 # Default sizes of each kind, relative to the unit.
 _SIZES: dict[str, tuple[float, ...]] = {
@@ -37,7 +38,8 @@ class Layout:
     unit : the default size of a body.
     hatch : the depth of the hatching behind a ground or wall.
     spans : by name of a ground, wall or belt, its two ends along its direction, counted from its place.
-    sides : by name, 1 if the bodies are to the left of its direction, otherwise -1.
+    sides : by name, 1 if the bodies on it are to the left of its direction, otherwise -1.
+    hung : the names of the pendulums whose pivot does not move.
     rests : by name of a spring its mean length, and of a damper the length at which it is half open.
     """
 
@@ -46,6 +48,7 @@ class Layout:
     spans: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     sides: Mapping[str, float] = field(default_factory=dict)
     rests: Mapping[str, float] = field(default_factory=dict)
+    hung: frozenset[str] = frozenset()
 
     def size(self, pose: Pose) -> tuple[float, float]:
         """Return the width and height of a shape."""
@@ -68,15 +71,13 @@ def layout_of(poses: Sequence[Poses]) -> Layout:
     bodies = [outline_of(pose, layout) for one in poses for pose in one.values() if _has_body(pose)]
     bodies += [np.vstack([p for p in pose.ends if not isinstance(p, str)]) for one in poses for pose in one.values()
                if any(not isinstance(p, str) for p in pose.ends)]  # fmt: skip
-    centre = np.mean([np.mean(body, axis=0) for body in bodies or [np.array([(low + high) / 2])]], axis=0)
+    bodies = bodies or [np.array([(low + high) / 2])]
     spans, sides = {}, {}
     for pose in poses[0].values():
         if pose.shape.kind in LINES:
             name = pose.shape.name
             spans[name] = _span(name, poses, layout, bodies)
-            direction = direction_of(pose)
-            across = direction[0] * (centre - pose.at)[1] - direction[1] * (centre - pose.at)[0]
-            sides[name] = 1.0 if across >= 0 else -1.0
+            sides[name] = _side(pose, bodies, layout.unit)
     rests: dict[str, float] = {}
     for name, pose in poses[0].items():
         if len(pose.ends) == 2:
@@ -84,7 +85,22 @@ def layout_of(poses: Sequence[Poses]) -> Layout:
             rests[name] = float(np.mean(lengths))
             if pose.shape.kind == "damper":  # its cylinder has room when the damper is shortest
                 rests[name] = min(rests[name], float(np.min(lengths)) / _CLOSED)
-    return Layout(unit, hatch, spans, sides, rests)
+    hung = frozenset(
+        name
+        for name, pose in poses[0].items()
+        if pose.shape.kind == "pendulum" and all(np.array_equal(one[name].at, pose.at) for one in poses)
+    )
+    return Layout(unit, hatch, spans, sides, rests, hung)
+
+
+def _side(pose: Pose, bodies: Sequence[Points], unit: float) -> float:
+    """Return the side of a line on which the bodies are that touch it; without such bodies, the side of all bodies."""
+    direction = direction_of(pose)
+    normal = np.array([-direction[1], direction[0]])
+    across = [(body - pose.at) @ normal for body in bodies]
+    touching = [reach for reach in across if np.min(np.abs(reach)) < _TOUCH * unit < np.max(np.abs(reach))]
+    middle = np.mean([np.mean(reach) for reach in touching or across])
+    return 1.0 if middle >= 0 else -1.0
 
 
 def _anchors(pose: Pose) -> Iterator[Points]:
