@@ -17,6 +17,7 @@ from hybridsim.model.parts.contact import Contact
 from hybridsim.model.smoothing.one_sided import number_of
 
 _SMALL = 1e-3  # relative to the largest load: below it, the friction of the contact hardly affects the result
+_SHIFT, _UNIT = 2.0**-30, 2.0**-50  # relative changes: for a difference, and of a few roundings
 _SAMPLES = 256  # of a period, for its largest load
 
 
@@ -41,13 +42,26 @@ def zero_loads(system: System, t: float, x: np.ndarray) -> tuple[str, ...]:
             continue
         later = [_load(contact, system, meanings, numbers, time) for time in _other_times(system, t)]
         largest = max((other for other in later if other is not None), default=0.0)
-        if load == 0.0 or load < _SMALL * largest:
-            compared = f", below {_SMALL:g} of its largest value {largest:.4g}" if load else ""
+        rounding = _rounding(contact, system, meanings, numbers, t, load)
+        if load == 0.0 or load < _SMALL * largest or load <= rounding:
+            compared = f", below {_SMALL:g} of its largest value {largest:.4g}" if load and largest else ""
+            compared = ", zero within rounding" if load and load <= rounding and not largest else compared
             found.append(
                 f"the normal load of {contact.name} is {load:.4g} at t = {t:g}{compared}, at which the model is "
                 "linearized, and it changes with time: give the model its final load as a constant"
             )
     return tuple(found)
+
+
+def _rounding(
+    contact: Contact, system: System, meanings: Meanings, numbers: Mapping[str, float], t: float, load: float
+) -> float:
+    """Return how much a load changes at most if the time and each number in it change by a rounding error."""
+    moved = [_load(contact, system, meanings, numbers, t * (1.0 + _SHIFT))]
+    for name in meanings.depended_on(contact.normal.names) & numbers.keys():
+        shifted = {**numbers, name: numbers[name] * (1.0 + _SHIFT)}
+        moved.append(_load(contact, system, meanings, shifted, t))
+    return sum(abs(other - load) for other in moved if other is not None) * (_UNIT / _SHIFT)
 
 
 def _load(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from os import PathLike
 from typing import Any
@@ -41,6 +41,8 @@ class LyapunovExponents(Readable):
         (M,) standard errors of the means, from ten consecutive parts of the motion. NaN for an exponent of -inf.
     t_span : tuple of float
         The part of the motion over which they are means.
+    warnings : tuple of str, optional
+        Contacts that stick, and surfaces along which the motion slides, during the last half of it or longer.
 
     Examples
     --------
@@ -53,6 +55,7 @@ class LyapunovExponents(Readable):
     values: np.ndarray
     errors: np.ndarray
     t_span: tuple[float, float]
+    warnings: tuple[str, ...] = ()
 
     @property
     def dimension(self) -> float:
@@ -74,6 +77,7 @@ class LyapunovExponents(Readable):
         rows = [
             f"Lyapunov exponents from t = {first:.6g} to t = {last:.6g}: {in_numbers(self.values)}",
             f"  standard errors: {in_numbers(self.errors)}",
+            *(f"  warning: {text}" for text in self.warnings),
         ]
         return "\n".join(rows)
 
@@ -165,7 +169,19 @@ def lyapunov_exponents(
     with np.errstate(invalid="ignore"):  # -inf - (-inf)
         means = rates[:, order].reshape(_BATCHES, -1, count).mean(axis=1)
         errors = means.std(axis=0, ddof=1) / math.sqrt(_BATCHES)
-    return LyapunovExponents(means.mean(axis=0), errors, (transient, transient + duration))
+    t_span = (transient, transient + duration)
+    return LyapunovExponents(means.mean(axis=0), errors, t_span, tuple(_held(growth, t_span)))
+
+
+def _held(growth: Growth, t_span: tuple[float, float]) -> Iterator[str]:
+    """Yield a warning for each component that is in stick, or slides, during the last half of the motion."""
+    first, last = t_span
+    for name, since in growth.held_since.items():
+        if since <= 0.5 * (first + last):
+            yield (
+                f"{name} stays in mode {growth.holds[name]} from t = {max(since, first):.6g} to the end: there a "
+                "shift of a position neither grows nor decays, and an exponent of 0 does not mean a regular motion"
+            )
 
 
 def _length(value: Any, what: str) -> float:

@@ -40,6 +40,9 @@ class Growth:
         generic = np.random.default_rng(0).standard_normal((len(scale), count))
         generic[:, 0] = 1.0
         self.directions = np.linalg.qr(generic)[0]
+        surfaces = [c for c in motion.model.all_components() if c.surface is not None and c.surface.hold]
+        self.holds = {c.name: c.surface.hold for c in surfaces if c.surface is not None}
+        self.held_since: dict[str, float] = {}  # since when components are in stick, or slide on a surface
         self.count, self.numbers = count, np.arange(count)  # the numbers of the directions that are followed
 
     def over(self, duration: float, halvings: int = _HALVINGS) -> np.ndarray:
@@ -66,6 +69,11 @@ class Growth:
         """Follow the motion for a duration, and return the directions at its end."""
         n, motion, before = len(self.point.x), self.motion, self.directions * self.scale
         solution = motion.run(self.point, duration)
+        for name, hold in self.holds.items():
+            if all(interval.mode == hold for interval in solution.modes[name]):
+                self.held_since.setdefault(name, self.point.at)
+            else:
+                self.held_since.pop(name, None)
         self.point = replace(point_at_end(solution), at=self.point.at + duration)
         if not before.shape[1]:
             return before

@@ -22,6 +22,7 @@ from hybridsim.analysis.steady.motion import (
     Point,
 )
 from hybridsim.analysis.steady.period_argument import require_multiple
+from hybridsim.analysis.steady.plain_time import refuse_plain_time
 from hybridsim.analysis.steady.result import SteadyState
 from hybridsim.analysis.steady.scales import rounding_of
 from hybridsim.analysis.steady.settling import (
@@ -161,7 +162,8 @@ def steady_state(
         chosen = {"params": params, "x0": x0, "z0": z0, "period": period, "integrator": integrator, **options}
         return steady_state_of_structure(model, effort, used, report, **chosen)
     system = system_of(model)
-    _refuse_what_ends(system, period is not None)
+    _refuse_what_ends(system)
+    refuse_plain_time(system, None if period is None else require_multiple(period, None, model.name))
     chosen = {"x0": x0, "z0": z0, "period": period, "integrator": integrator, **options}
     own = common_period(system)
     if period is None:
@@ -434,7 +436,7 @@ def _found(
     return SteadyState(motion.unwatched(), kind, orbit, is_free, newton_steps, periods, message or kind)
 
 
-def _refuse_what_ends(system: System, has_period: bool) -> None:
+def _refuse_what_ends(system: System) -> None:
     """Reject models with impacts, and models that an event or an input changes permanently."""
     model = system.model
     if system.is_unilateral.any():
@@ -460,10 +462,3 @@ def _refuse_what_ends(system: System, has_period: bool) -> None:
                 f"clock {clock.name} of model {model.name} begins after its first period",
                 remedy="use a `start` below the period of the clock",
             )
-    tape = system.code.data["tape"]
-    plain = tape is not None and any(source == system.layout.origin_at for _, source in tape["parameters"])
-    if plain and not has_period:
-        raise UsageError(
-            f"model {model.name} contains t outside of sines and cosines: its period is unknown",
-            remedy="if the motion is periodic, pass `period`",
-        )

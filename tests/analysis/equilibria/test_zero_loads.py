@@ -60,6 +60,15 @@ def test_a_load_that_is_small_beside_its_largest_is_named(normal: str, t: float,
     assert f"at t = {t:g}, below 0.001 of its largest value {largest:.4g}," in warning
 
 
+@pytest.mark.parametrize("normal", ["N0*(t - 0.3)", "N0*t - 1.2", "N0*load"])
+def test_a_load_that_is_zero_only_by_rounding_is_named(normal: str) -> None:
+    """0.1 + 0.2 is larger than 0.3 by 5.6e-17, and nothing tells how large the load becomes later."""
+    model = replace(_only(normal), definitions={"load": "t - 0.3"})
+    (warning,) = hs.linearize(model, "slip-", t=0.1 + 0.2).warnings
+    assert "e-16 at t = 0.3, zero within rounding, at which" in warning
+    assert hs.linearize(model, "slip-", t=0.3 + 1e-9).warnings == ()
+
+
 def test_a_hundredth_of_the_largest_load_is_not_small() -> None:
     waving = replace(pad("N0*(1.02 - cos(pi*t/2))"), inputs=())  # from 0.02 to 2.02 N0
     found = hs.linearize(waving, "slip-")

@@ -105,6 +105,24 @@ def test_what_decays_beside_a_block_that_sticks_is_not_lost() -> None:
     assert found.values[:2] == pytest.approx([0.0, -3.0], abs=0.1) and found.values[2] == -math.inf
 
 
+def test_a_motion_that_sticks_for_good_is_told() -> None:
+    """The block stops at t = 10; a shift of its position then stays as it is, and the exponent is 0 +/- 0."""
+    block = hs.Model(
+        "block",
+        states=(hs.State("x", 0.0, "v"), hs.State("v", 1.0, "-f")),
+        contacts=(hs.Contact("f", "v", 1.0, "coulomb", arguments={"mu": 0.1}),),
+    )
+    found = hs.lyapunov_exponents(block, 100, transient=20)
+    assert found.values[0] == found.errors[0] == 0.0
+    (warning,) = found.warnings
+    assert warning.startswith("f stays in mode stick from t = 20 to the end")
+    assert f"warning: {warning}" in repr(found)
+    late = hs.lyapunov_exponents(block, 40, transient=2).warnings
+    assert 10.0 <= float(late[0].partition("t = ")[2].split()[0]) <= 10.4  # 40/200 of the motion is a part
+    for moving in ("belt", "feeny-moon"):
+        assert hs.lyapunov_exponents(moving, 100).warnings == ()
+
+
 def test_progress_is_a_share_that_grows() -> None:
     shares: list[float] = []
     hs.lyapunov_exponents(oscillator(0.1), 20, progress=shares.append)

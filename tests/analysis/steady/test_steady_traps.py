@@ -84,8 +84,12 @@ reset.x = "x + 1\""""
 @pytest.mark.parametrize(
     ("states", "rest", "said"),
     [
-        ('x = { start = 0, der = "-x + exp(-0.01*t)*sin(t)" }', "", "contains t outside of sines"),
-        ('x = { start = 0, der = "-x + 0.1*t" }', "", "contains t outside of sines"),
+        (
+            'x = { start = 0, der = "-x + exp(-0.01*t)*sin(t)" }',
+            "",
+            "state x, der contains t outside of sines",
+        ),
+        ('x = { start = 0, der = "-x + 0.1*t" }', "", "state x, der contains t outside of sines"),
         (
             'x = { start = 0, der = "-x + sin(t)" }',
             '[schedules.s]\ntimes = [1.0]\nreset.x = "x + 1"',
@@ -96,6 +100,19 @@ reset.x = "x + 1\""""
 def test_what_ends_or_grows_is_refused(states: str, rest: str, said: str) -> None:
     with pytest.raises(UsageError, match=said):
         hs.steady_state(model(states, "", rest))
+
+
+@pytest.mark.parametrize("ramp", ["0.01*t", "min(t/2, 1)*t", "exp(-t)"])
+def test_a_ramp_does_not_repeat_with_a_period_that_is_passed(ramp: str) -> None:
+    """The search sets the time back after each period, and would find a periodic motion that does not exist."""
+    oscillator = model(
+        f'x = {{ start = 0, der = "v" }}\nv = {{ start = 0, der = "sin(t) - v - x + {ramp}" }}'
+    )
+    with pytest.raises(UsageError, match=r"state v, der does not repeat after the period 6\.28319"):
+        hs.steady_state(oscillator, period=2.0 * math.pi)
+    defined = model('x = { start = 0, der = "push - x" }', "", f"[definitions]\npush = '{ramp}'")
+    with pytest.raises(UsageError, match="definition push does not repeat"):
+        hs.steady_state(defined, period=2.0 * math.pi)
 
 
 def test_a_period_that_is_not_the_forcings_is_refused() -> None:
