@@ -1,14 +1,24 @@
-"""This module checks the period of the forcing that a call of `steady_state` contains."""
+"""This module checks the period of a steady state: the argument `period`, and rates that depend on t itself."""
 
 from __future__ import annotations
 
+import ast
 import math
+from collections.abc import Iterator
 from typing import Any
 
 from hybridsim.arguments import cannot_be, number
+from hybridsim.engine.system.system import System
 from hybridsim.errors import UsageError
+from hybridsim.expr.grammar import TIME
+from hybridsim.model import Model
+from hybridsim.model.meanings import Meanings
+from hybridsim.model.smoothing.one_sided import names_of, number_of
 
 _COMMENSURATE = 1e-9  # relative difference from a whole multiple
+_PERIODIC = ("sin", "cos")
+_SAMPLES, _OFFSET = 32, 0.381966  # times in a period; the offset keeps them away from steps at round times
+_REPEATS = 1e-6  # largest relative change over a period, because periods are rounded
 
 
 def require_multiple(period: Any, own: float | None, name: str) -> float:
@@ -22,3 +32,69 @@ def require_multiple(period: Any, own: float | None, name: str) -> float:
             remedy="remove `period`, or use a whole multiple of the forcing period",
         )
     return found
+
+
+def refuse_plain_time(system: System, period: float | None) -> None:
+    """Reject a declaration with plain t if the period is unknown, or if its value does not repeat with the period.
+
+    Raises
+    ------
+    UsageError
+        The message names the declaration.
+    """
+    tape = system.code.data["tape"]
+    if tape is None or all(source != system.layout.origin_at for _, source in tape["parameters"]):
+        return
+    model = system.written
+    meanings, discrete = Meanings(model), {part.name for part in model.discrete}
+    inputs = [signal.name for signal in model.inputs]
+    names = [*system.names, *sorted(discrete), *inputs, *model.variables()]
+    numbers = {name: 0.739 + 0.0618 * k for k, name in enumerate(names)} | model.parameter_values()
+    for what, tree in _with_time(model):
+        if period is None:
+            raise UsageError(
+                f"{what} contains t outside of sines and cosines: the period of model {model.name} is unknown",
+                remedy="if the motion is periodic, pass `period`",
+            )
+        if meanings.depended_on(names_of(tree)) & discrete:
+            continue  # a discrete state may hold the time of an event
+        times = [period * (k + _OFFSET) / _SAMPLES for k in range(_SAMPLES)]
+        pairs = [
+            [number_of(tree, {**numbers, TIME: at}, meanings.lookup) for at in (t, t + period)] for t in times
+        ]
+        largest = max((abs(value) for pair in pairs for value in pair if value is not None), default=0.0)
+        for t, (now, later) in zip(times, pairs, strict=True):
+            if now is not None and later is not None and abs(later - now) > _REPEATS * largest:
+                raise UsageError(
+                    f"{what} does not repeat after the period {period:g}: it changes by {later - now:.4g} from "
+                    f"t = {t:.4g} to t = {t + period:.4g}",
+                    remedy="pass the period of the forcing, or replace a ramp by its final value",
+                )
+    if period is None:  # t in a guard or a reset
+        raise UsageError(
+            f"model {model.name} contains t outside of sines and cosines: its period is unknown",
+            remedy="if the motion is periodic, pass `period`",
+        )
+
+
+def _with_time(model: Model) -> Iterator[tuple[str, ast.expr]]:
+    """Yield the declarations that contain t outside of sines and cosines, with their names for messages."""
+    found = [(f"definition {name}", expr) for name, expr in model.definitions]
+    for contact in model.contacts:
+        found.append((f"contact {contact.name}, normal", contact.normal))
+        found.append((f"contact {contact.name}, velocity", contact.velocity))
+        found += [(f"contact {contact.name}, {name}", expr) for name, expr in contact.arguments.items()]
+    for component in model.components:
+        for mode in component.modes:
+            what = f"component {component.name}, mode {mode.name}"
+            found += [(f"{what}, {name}", expr) for name, expr in (*mode.der.items(), *mode.set.items())]
+    found += [(f"state {state.name}, der", state.der) for state in model.states]
+    yield from ((what, expr.tree) for what, expr in found if _has_plain_time(expr.tree))
+
+
+def _has_plain_time(node: ast.AST) -> bool:
+    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in _PERIODIC:
+        return False
+    if isinstance(node, ast.Name):
+        return node.id == TIME
+    return any(map(_has_plain_time, ast.iter_child_nodes(node)))

@@ -21,8 +21,7 @@ from hybridsim.analysis.steady.motion import (
     Motion,
     Point,
 )
-from hybridsim.analysis.steady.period_argument import require_multiple
-from hybridsim.analysis.steady.plain_time import refuse_plain_time
+from hybridsim.analysis.steady.period_argument import refuse_plain_time, require_multiple
 from hybridsim.analysis.steady.result import SteadyState
 from hybridsim.analysis.steady.scales import rounding_of
 from hybridsim.analysis.steady.settling import (
