@@ -51,7 +51,7 @@ def cheapest(rows: Iterable[Row]) -> str:
 
 
 def failure_of(row: Row) -> str:
-    """Return why a run has no result."""
+    """Return the reason why a run has no result."""
     return f"{row.status}: {row.message}" if row.message else row.status
 
 

@@ -131,7 +131,7 @@ def equilibria(
 
 
 def _add(found: list[Equilibrium], new: Equilibrium, rounding: np.ndarray) -> None:
-    """Add an equilibrium. A point on a corner is stored once, with the larger growth rate of its two sides."""
+    """Add an equilibrium; one on a corner is stored once, with the larger growth rate of the two sides."""
     for i, old in enumerate(found):
         is_same = old.is_point and new.is_point and old.modes == new.modes
         if is_same and (np.abs(old.x - new.x) <= rounding).all():

@@ -39,7 +39,7 @@ class Field:
         self.free = [i for i in range(system.n) if i not in self.held]
 
     def __call__(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Return f (n,), f_x (n, n), g (G,), g_x (G, n) with held states on their constraints."""
+        """Return rates f, guards g and their derivatives, with held states computed from their constraints."""
         found = self._tape(np.zeros(1), x[None, :], self.p, self._seeds)
         n = self.system.n
         return found.values[0, :n], found.slopes[0, :n], found.values[0, n:], found.slopes[0, n:]
@@ -71,7 +71,7 @@ class Field:
         return np.where(found > 0.0, found, 1.0)
 
     def projected(self, x: np.ndarray) -> np.ndarray:
-        """Return x with held states evaluated from their constraints."""
+        """Return the states x after computing held states from their constraints."""
         return self.system.project(0.0, x, self.p, self.z)
 
 

@@ -143,7 +143,7 @@ class Motion:
         return {"atol": [1e-3 * rtol * size for size in sizes]}
 
     def on_constraints(self, point: Point) -> Point:
-        """Return the point with held states evaluated from their constraints at the model's parameters."""
+        """Return the point after computing held states from their constraints at the model's parameters."""
         system = system_of(self.model)
         x = system.project(0.0, point.x, system.vector(Instant(0.0), point.discrete), point.numbers)
         return replace(point, x=x)

@@ -159,7 +159,7 @@ class FlowDerivatives:
     def projected(
         self, segment: Segment, Y: np.ndarray, Yd: np.ndarray, G: np.ndarray, s: float | None = None
     ) -> np.ndarray:
-        """Return the derivatives after correction by the constraints of the held states."""
+        """Return the derivatives after correction by the constraints that determine held states."""
         system = self.system
         if not system.holds(segment.z):
             return Y

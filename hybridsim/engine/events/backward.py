@@ -13,7 +13,7 @@ from hybridsim.engine.system.system import System
 
 
 def held(system: System, z: np.ndarray) -> str:
-    """Return why a state held at a surface has no unique past, or an empty text if no state is held."""
+    """Return the reason why a state held at a surface has no unique past, or an empty text if no state is held."""
     names = [a.name for a, m in zip(system.automata, z, strict=True) if a.has_surface and m == a.hold]
     return (
         f"{', '.join(names)} is in a holding mode, which several motions can enter: the past is not unique"
@@ -30,7 +30,7 @@ def message_on_direction(t0: float, t1: float) -> str:
 
 
 def entered_here(system: System, z: np.ndarray, fired: tuple[int, ...]) -> str:
-    """Return why a component without a surface cannot cross a guard backward in time, or an empty text."""
+    """Return the reason why a component without a surface cannot cross a guard backward in time, or an empty text."""
     for g in fired:
         automaton = system.automata[int(system.owner[g])]
         if not (automaton.has_surface or automaton.is_corner):
@@ -46,7 +46,7 @@ def has_no_past(
     stopping: tuple[int, ...],
     schedules: tuple[int, ...],
 ) -> str:
-    """Return why the event at the end of a segment has no unique past, or an empty text.
+    """Return the reason why the event at the end of a segment has no unique past, or an empty text.
 
     The arguments are the guards, the stopping monitors and the schedules of that event.
     """

@@ -25,7 +25,7 @@ _NEAR, _FARTHEST = 60, 1e-5  # halvings of the probe, and its longest reach as a
 
 @np.errstate(over="ignore", invalid="ignore")  # overflow and nan are what it looks for
 def in_the_way(system: System, record: Trajectory, outcome: Outcome, origin: Instant, p: np.ndarray) -> str:
-    """Return why no step succeeds at the point where a run stopped, or an empty text.
+    """Return the reason why no step succeeds at the point where a run stopped, or an empty text.
 
     The search goes along the tangent at the last state. It looks for the first of the rates, then of the active guards,
     that is not a number.
@@ -96,7 +96,7 @@ def advice_on_sizes(system: System) -> str:
 
 @np.errstate(over="ignore", invalid="ignore", divide="ignore")  # nan is what it looks for
 def rates_without_value(system: System, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> str:
-    """Return which rates are not numbers in the modes `z`, and why, or an empty text."""
+    """Name the rates that are not numbers in the modes `z`, with the reasons; return an empty text if there is none."""
     names = [system.names[i] for i in np.flatnonzero(~np.isfinite(system.flow(s, x, p, z)))]
     if not names:
         return ""
@@ -106,7 +106,7 @@ def rates_without_value(system: System, s: float, x: np.ndarray, p: np.ndarray, 
 
 
 def _cause(system: System, names: list[str], t: float, x: np.ndarray) -> str:
-    """Return why the rates of some states are not numbers, or an empty text if the reason is unknown."""
+    """Return the reason why the rates of some states are not numbers, or an empty text if the reason is unknown."""
     return power_without_value(system, names, t, x) or _division_by_zero(system, names, x)
 
 

@@ -63,7 +63,7 @@ def situation_when_due(
 def _with_evaluated(
     system: System, before: np.ndarray, x: np.ndarray, p: np.ndarray, z: np.ndarray, error: np.ndarray
 ) -> np.ndarray:
-    """Return the state errors at a scheduled time, including the errors of held states.
+    """Return the errors of all states at a scheduled time, including held states.
 
     Held states were evaluated at a local time of the run-time vector `before`, and are judged at the origin of p. Both
     times are rounded.

@@ -1,4 +1,4 @@
-"""Detect whether a jump of an input or of a corner moves a surface, and so releases its component.
+"""Detect whether a jump of an input or of a corner moves a surface, so that its component is released.
 
 For a closed gap the rate counts as well: a floor that jumps in speed strikes the body on it, or leaves it.
 """

@@ -96,7 +96,7 @@ class HybridState:
         return HybridState(self.memory.copy(), self._layout)
 
     def packed(self) -> Any:
-        """Return the arrays packed for kernels; the pack keeps the memory alive."""
+        """Return the arrays in packed form for kernels; the pack keeps their memory alive."""
         return packed(StateArrays(*(getattr(self, name) for name in _FIELDS)))
 
     def outcome(self) -> Outcome:

@@ -103,7 +103,7 @@ class Flow:
         return columns.T
 
     def project(self, s: np.ndarray, x: np.ndarray) -> np.ndarray:
-        """Return states (k, n) at local times (k,), in which held states satisfy their constraints."""
+        """Return states (k, n) at local times (k,), with held states computed from their constraints."""
         x = np.ascontiguousarray(x, dtype=float)
         return self.system.rows("project", self.n, s, x, self.p, self.z) if self.system.can_hold else x
 

@@ -305,7 +305,7 @@ class FixedStepRun:
         return self.march.trial(s, tau, self.x, p, self.z)
 
     def _monitors(self, s: float, x: np.ndarray, p: np.ndarray) -> np.ndarray:
-        """Return the values of the monitors at the integrated states, without projection of held states."""
+        """Return the values of the monitors at the integrated states; held states are not projected."""
         free = p.copy()
         free[self.system.layout.pin_at] = 0.0
         names = self.system.monitor_names

@@ -72,7 +72,7 @@ def on_its_side(resolution: EventVerdicts, members: list[int], candidates: np.nd
 
 
 def keeps_nothing(resolution: EventVerdicts, members: list[int], z: np.ndarray) -> str:
-    """Return why a motion along several surfaces may not be unique, or an empty text if the motion is unique."""
+    """Return the reason why a motion along several surfaces may not be unique, or an empty text if it is unique."""
     automata = resolution.system.automata
     sliding = [c for c in members if automata[c].is_unique and z[c] == automata[c].hold]
     if len(sliding) < 2:

@@ -81,7 +81,7 @@ def combine_resets(
 
 
 def _contradiction(system: System, name: str, one: _Changes) -> str:
-    """Return why the changes of one variable at one instant are incompatible, or an empty text."""
+    """Return the reason why the changes of one variable at one instant are incompatible, or an empty text."""
     keys = [key for key, _, _ in (*one.set, *one.added)]
     if len(keys) < 2 or not one.set:
         return ""
