@@ -132,7 +132,7 @@ class FirstSteps:
         return self.stepper.restep(step, s)
 
     def _is_clear(self, s: float, x: np.ndarray) -> bool:
-        """Return whether the hidden guards exceed their errors."""
+        """Return whether all guards that errors could hide have become larger than their errors."""
         sizes = self.tolerances.atol + self.tolerances.rtol * np.abs(x)
         values, errors = changes(self.flow, self.hidden, s, x, sizes)
         return bool((values > np.maximum(_CLEAR * errors, self.floors)).all())

@@ -85,7 +85,7 @@ class Question:
         return int(_name_and_number(self.text.partition(".")[2])[1] or 1)
 
     def ask(self, model: Model, progress: Callable[[float], None] | None = None) -> Answer:
-        """Compute the quantity from a steady state or a run, and measure the cost without compiling.
+        """Compute the quantity from a steady state or a run, and measure the cost without the time for compiling.
 
         Raises
         ------

@@ -136,7 +136,7 @@ def graph_distance(first: CompletedGraph, second: CompletedGraph) -> float:
 
 
 def _farthest(one: CompletedGraph, other: CompletedGraph, end: float) -> float:
-    """Return the largest distance of a point of one graph from the other graph."""
+    """Return the largest distance of the points of one graph from another graph."""
     times, states = one.points(other, end)
     bound = other._bound(times, states, end)
     order = np.argsort(-bound)

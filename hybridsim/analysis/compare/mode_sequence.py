@@ -19,7 +19,7 @@ _MISSED, _MATCHED, _SPURIOUS = 0, 1, 2
 
 @dataclass(frozen=True)
 class SequenceVerdict:
-    """The counted differences between the mode sequences of a run and of the reference."""
+    """The numbers of missed, spurious and wrong modes of a run, in comparison with the reference."""
 
     missed: int = 0
     spurious: int = 0
@@ -128,7 +128,7 @@ def _without_instants(entries: Sequence[_Entry]) -> list[_Entry]:
 
 
 def _align(expected: Sequence[_Entry], found: Sequence[_Entry], window: float) -> list[tuple[int, int]]:
-    """Return the index pairs of the cheapest alignment, in order; only entries within the time window match.
+    """Return the index pairs of the cheapest alignment, in order; only elements within the time window match.
 
     This is the edit distance, row by row over the expected entries and, in each row, over the found entries
     within the window only. The work therefore grows linearly with the number of events.

@@ -63,7 +63,7 @@ def aligned_cells(cells: tuple[str, ...], widths: list[int]) -> str:
 
 
 def turns(count: int) -> str:
-    """Describe the number of repetitions behind a median time."""
+    """Return a text that says how often a run was repeated for its median time."""
     return "one turn" if count == 1 else f"median over {count} turns"
 
 

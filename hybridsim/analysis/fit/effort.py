@@ -33,7 +33,7 @@ class Effort:
             print(f"hybridsim: {text}", file=sys.stderr, flush=True)
 
     def affordable_runs(self) -> int:
-        """Return the number of runs that further first guesses may take after the first one.
+        """Return how many runs may be used for further guesses.
 
         They may take twice as many as the first guess, and more if all of them last less than 20 s.
         """

@@ -187,7 +187,7 @@ def _declared(
 
 
 def _rank(row: LawFit) -> tuple[float, float]:
-    """Return the key of a law in the order of the laws. Laws that agree with held-out records are ranked by AICc."""
+    """Return a sort key for laws: the residual of held-out records comes first, then AICc."""
     return (0.0 if row.held_out is None else max(row.held_out, ROUNDING)), row.aicc
 
 

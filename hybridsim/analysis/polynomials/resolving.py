@@ -60,7 +60,7 @@ class Sample(Protocol):
     @property
     def names(self) -> tuple[str, ...]: ...
     def __call__(self, index: np.ndarray, s: np.ndarray) -> np.ndarray:
-        """Return the values (k, Q) at local times s (k,) in segments index (k,)."""
+        """Return the values (k, Q) at local times s (k,) in the segments with the numbers `index` (k,)."""
 
 
 class Sampler:

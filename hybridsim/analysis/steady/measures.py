@@ -125,7 +125,7 @@ class Measures:
         return tuple(name for name in self._names if name in self._orbit.too_fast)
 
     def _orbit_with(self, name: str) -> Orbit:
-        """Return an orbit that contains a quantity."""
+        """Return an orbit that contains the given quantity."""
         return self._orbit
 
     def _extreme(self, name: str, side: int) -> float:

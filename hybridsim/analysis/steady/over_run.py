@@ -70,7 +70,7 @@ class OverRun(Measures):
         return float(sum(before != hold == after for before, after in pairwise(modes)))
 
     def first_passage(self, name: str, level: float, is_upward: bool) -> float:
-        """Return the first time at which a quantity is beyond a level, or infinity if it never is.
+        """Return the first time at which a quantity is beyond a level, or infinity if there is no such time.
 
         It is above the level if `is_upward`, otherwise below it. Between two extrema a quantity passes a level at most
         once, so that no passage is missed. A quantity that only touches the level, within rounding, does not pass it.

@@ -1,4 +1,4 @@
-"""This module presents a mechanical system to a sweep with named parameters and states, as a `Model` has them."""
+"""This module gives a mechanical system the named parameters and states that a sweep needs."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ class SweptSystem:
         return SweptSystem(self.system.with_(q0=q0, v0=v0))
 
     def with_(self, **changes: Any) -> MechanicalSystem:
-        """Return the system with some named values changed, which may be expressions of the others."""
+        """Return the system with some named values changed; a value may be an expression of other values."""
         known = {p.name: p.value for p in self.parameters}
         found = resolve(known | {name: parse(value) for name, value in changes.items()})
         return with_values(self.system, {name: found[name] for name in changes})

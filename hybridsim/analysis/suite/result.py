@@ -29,7 +29,7 @@ class SceneResult:
     comparison: Comparison
 
     def cheapest(self, accuracy: float) -> Row | None:
-        """Return the fastest row with correct modes whose error of the states is within an accuracy."""
+        """Return the fastest row with correct modes and a state error of at most a given accuracy."""
         good = [row for row in self.comparison.rows if self._reaches(row, accuracy)]
         # other rows include the time of warming up
         timed = [row for row in good if row.cost and row.cost.repetitions]

@@ -75,7 +75,7 @@ def in_the_way(system: System, record: Trajectory, outcome: Outcome, origin: Ins
 
 
 def name_vanished_load(system: System, record: Trajectory) -> None:
-    """Change the status and the message of a run that stopped where a law divides by a load of zero.
+    """Correct the status and the message of a run that stopped because a law divides by a load of zero.
 
     Near the zero the signs of the load and of the rates of the law are those of roundings, so the run may seem to have
     no admissible mode, or to have events that accumulate.

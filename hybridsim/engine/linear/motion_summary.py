@@ -47,7 +47,7 @@ def _state_and_slope(lin: Any, k: int, i: int, v: Any) -> tuple[float, float]:
 def _turn(
     lin: Any, k: int, i: int, c: Any, low: float, high: float, at_low: float, at_high: float, v: Any
 ) -> float:
-    """Return the value of a state at the zero of its rate between two times."""
+    """Return the extreme value of a state at the zero of its rate between two times."""
     value, same_end = 0.0, 0
     for _ in range(_ITERATIONS):
         s = low - at_low * (high - low) / (at_high - at_low)

@@ -93,7 +93,7 @@ def write_lengths(flows: Any, lasting: Any, near: Any) -> None:
 
 @kernel
 def write_tables(A: Any, guards: Any, n: int, usable: Any, flows: Any, gamma: Any, tables: Any) -> None:
-    """Write the rows of all modes to `tables` (`hybridsim.engine.linear.tables.LinearTables`), which contain zeros.
+    """Write the rows of all modes to `tables`, which must contain zeros.
 
     A (K, m, m), guards (K, G, m), usable (K,): see `leave_out`. flows: `hybridsim.engine.linear.modal.Modals`.
     gamma (J,): scratch.

@@ -69,7 +69,7 @@ def _is_usable(folder: Path) -> bool:
 
 @cache
 def note(text: str, remedy: str) -> None:
-    """Print once, on stderr, why compiled code is not cached."""
+    """Print the reason why compiled code is not cached, on stderr and only once."""
     print(f"hybridsim: {text}; compiled code is not stored ({remedy})", file=sys.stderr, flush=True)
 
 

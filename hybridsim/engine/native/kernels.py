@@ -271,7 +271,7 @@ def kernel_address(function: Callable[..., int], *examples: Any) -> int:
 
 
 class Precompiled:
-    """A kernel with the same argument types at every call, which are resolved only once.
+    """A kernel whose argument types are determined only once, because they are equal at every call.
 
     Resolving the types of packs takes longer than a short run.
     """

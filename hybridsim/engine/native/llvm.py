@@ -87,7 +87,7 @@ def translated(text: str, names: Sequence[str]) -> str:
 
 
 def functions_in(text: str) -> list[str]:
-    """Return the names of the functions of a generated module that are compiled."""
+    """Return the names of those functions of a generated module that are compiled."""
     return re.findall(r"^def (\w+)\(t, x, p, z, out", text, re.MULTILINE)
 
 

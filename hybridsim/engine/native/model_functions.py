@@ -80,7 +80,7 @@ if ENABLED:
 else:
 
     def compile_model_function(module: Any, name: str) -> tuple[Any, Any]:
-        """Wrap a model function so that it computes as compiled code does."""
+        """Wrap a model function in Python so that it gives the same results as compiled code."""
         return (as_compiled(getattr(module, name)),) * 2
 
     def texts_to_compile(module: Any) -> list[str]:

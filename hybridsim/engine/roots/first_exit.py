@@ -151,7 +151,7 @@ def dips(b: Any) -> bool:
 
 @kernel
 def change_of_sign(b: Any) -> float:
-    """Return where in [0, 1] the polygon of the Bernstein coefficients first becomes negative."""
+    """Return the point in [0, 1] at which the polygon of the Bernstein coefficients first becomes negative."""
     i = 1
     while b[i] >= 0.0:
         i += 1

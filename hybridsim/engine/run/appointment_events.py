@@ -1,4 +1,4 @@
-"""Test whether located guards fire at an input jump or a schedule, by the motion just after the jump or schedule.
+"""Test by the motion just after an input jump or a schedule whether located guards fire.
 
 A guard fires only if it is negative just after. A zero located by the motion before may turn back or stay at zero, such
 as a load that touches zero.

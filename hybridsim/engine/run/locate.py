@@ -107,7 +107,7 @@ class Locator:
         self.samples: list[np.ndarray] = []  # of guards and monitors, on the last searched step
 
     def search(self, step: Step, rounding: Callable[[], np.ndarray]) -> Findings:
-        """Return all zeros in a step; the function `rounding` returns the state errors so far."""
+        """Return all zeros in a step; the function `rounding` returns the state errors up to this step."""
         flow, width = self.flow, step.s1 - step.s0
         times = step.s0 + width * POINTS
         times[-1] = step.s1
@@ -190,7 +190,7 @@ class Locator:
         return clear
 
     def contradicts_flow(self, step: Step, hit: Hit, errors: np.ndarray, is_accurate: bool) -> bool:
-        """Return whether an early zero of a guard that starts from zero is an error of the first step.
+        """Return whether the early zero of a guard that starts at zero is only an error of the first step.
 
         A corner keeps its side if the flow rises from the located zero, and the next segment would begin in the same
         way. A first step of order one may have such an error. Another guard must have changed by more than rounding,

@@ -1,4 +1,4 @@
-"""Determine the state at a located event with error bounds, and all guards and monitors at zero."""
+"""Determine the state at a located event with error bounds, and the guards and monitors that are zero there."""
 
 from __future__ import annotations
 
@@ -142,7 +142,7 @@ def coincident(
 def located(
     system: System, origin: Instant, arrival: Arrival, segment: SegmentRun, target: float, is_due: bool
 ) -> Located:
-    """Return the state at the end of a segment, with the guards and monitors at zero.
+    """Return the state at the end of a segment, and the guards and monitors that are zero there.
 
     is_due: something is scheduled at the local time `target`, which may be this instant.
     """
@@ -242,7 +242,7 @@ def _before_instant(series: Any, arrival: Arrival, segment: SegmentRun) -> np.nd
 
 
 def located_backward(system: System, origin: Instant, arrival: Arrival, segment: SegmentRun) -> Located:
-    """Return the state, with the guards and monitors at zero, for a run backward in time."""
+    """Return the state at the end of a segment of a backward run, and the guards and monitors that are zero there."""
     at = situation(system, arrival, segment)
     fired = coincident(system, origin, at, arrival.fired) if arrival.fired else {}
     sides = segment.locator.monitor_sides

@@ -1,4 +1,4 @@
-"""Warn of accumulating events, of chattering, and of steps that stability limits.
+"""Warn of accumulating events, of chattering, and of steps that are limited by stability.
 
 They are derived from the record every few hundred events or steps and at the end. They never change the run.
 """
@@ -87,7 +87,7 @@ class Notices:
         return np.array([self._start, self._start])
 
     def accumulated(self, names: list[str]) -> None:
-        """Warn that the run continues from the limit of the events of some components."""
+        """Warn that the events of some components accumulate, and that the run continues from their limit."""
         self.record.warn(f"accumulation: events of {', '.join(names)} follow each other ever faster; the run "
                          f"continues from their limit")  # fmt: skip
 

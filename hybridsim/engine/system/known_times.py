@@ -125,7 +125,7 @@ class TimesAhead:
         return not set(system.resets.get(key, (0, ()))[1]) & set(system.names)
 
     def after(self, origin: Instant) -> KnownTimes:
-        """Return the known times after an instant, which must not be before the instant of the last call."""
+        """Return the known times after an instant; calls must follow each other in order of time."""
         block = self._block
         if block is not None:
             ahead = _minus(block.instants[self._passed :], np.array([origin])) > 0.0

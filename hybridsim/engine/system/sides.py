@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 def modes_by_state(
     system: System, components: Iterable[int], s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray
 ) -> np.ndarray:
-    """Return the modes `z`, in which some components get the mode that is valid at `x`.
+    """Return a copy of the modes `z` in which some components get the mode that is valid at `x`.
 
     A component on a border keeps its mode if that is one of the two; on a surface it holds if possible. An argument may
     have corners itself, so the modes are computed again until none changes.

@@ -220,7 +220,7 @@ def _by_reason(cells: list[Cell]) -> dict[str, list[str]]:
 
 
 def _with_error(cell: Cell) -> str:
-    """Return a method's name with its error, and with its order of convergence if the order is visible."""
+    """Return a method's name with its error, and with its order of convergence if this can be observed."""
     known = []
     if cell.error is not None and cell.rows:
         known.append(f"{cell.error:.0e}")

@@ -143,7 +143,7 @@ class Sending:
 
 
 def require_sendable(job: Job, cause: BaseException | None = None) -> None:
-    """Raise an error if a sweep cannot be sent to another process, and name the part at fault."""
+    """Raise an error if a sweep cannot be sent to another process; the error names the cause."""
     for what, thing in (("measure", job.measure), ("model", job.model)):
         try:
             pickle.dumps(thing)

@@ -59,7 +59,7 @@ def _edges(system: System, states: Sequence[str], values: Mapping[str, float]) -
 
 
 def is_at_edge(node: ast.expr, values: Mapping[str, float], lookup: Lookup = lambda _: None) -> bool:
-    """Return whether the function of one node may have no derivative at its present arguments."""
+    """Return whether the function at one node of an expression may have no derivative at its arguments."""
     match node:
         case ast.Call(func=ast.Name(id=name), args=args):
             arguments = [number_of(arg, values, lookup) for arg in args]

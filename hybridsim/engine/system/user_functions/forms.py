@@ -81,7 +81,7 @@ def parts_of(model: Model) -> Parts:
 
 
 def value(expr: Expression) -> Function | float:
-    """Return the function of an expression, or its value if it is constant."""
+    """Return an expression as a Python function, or as a number if it is constant."""
     return expr.function if isinstance(expr, FunctionExpression) else evaluate(expr, {})
 
 
