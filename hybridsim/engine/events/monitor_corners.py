@@ -31,7 +31,7 @@ _FATAL = "a monitor acts"  # never shown, because compiled loops leave such an e
 
 
 def _corner(name: str, monitor: Monitor) -> MonitorCorner:
-    """Return the corner of a monitor."""
+    """Return the corner that represents a monitor."""
     modes = []
     for mode, other, direction in zip(_MODES, reversed(_MODES), _DIRECTIONS, strict=True):
         tree = monitor.expr.tree
@@ -90,7 +90,7 @@ class MonitorCorners:
         return numbers
 
     def state(self, outcome: Outcome, p: np.ndarray) -> HybridState | None:
-        """Return a state of the system with corners, or None if a monitor is zero or not a number."""
+        """Return the state with a corner for each monitor, or None if a monitor is zero or not a number."""
         if not outcome.monitor_sides.all():
             return None
         modes = np.where(outcome.monitor_sides > 0, 0, 1)

@@ -93,7 +93,7 @@ def no_tables() -> LinearTables:
 
 @lru_cache(256)
 def _layout(atoms: tuple[int, ...], guards: int, n: int, size: int, widest: int, rows: int) -> ArrayLayout:
-    """Return the layout of tables; `atoms` counts functions of time, their terms, and factors of a monomial."""
+    """Return the memory layout of the tables of linear modes."""
     i, c, (count, terms, degree) = np.int64, complex, atoms
     wide, double, blocks = filled_up(n) + filled_up(size - n), filled_up(2 * widest), filled_up(n) // LANES
     of_atoms: list[tuple[Any, tuple[int, ...]]] = [
@@ -125,7 +125,7 @@ class _Rows:
         self.size, self.all = layout.size, layout.zeros()
 
     def part(self, first: int, count: int) -> LinearTables:
-        """Return tables of the rows from `first` up to `count`."""
+        """Return the tables of the modes in the rows from `first` up to `count`."""
         tables: LinearTables = self.all
         if first or count < self.most:
             fields = ((name, getattr(tables, name)) for name in LinearTables._fields)
@@ -134,7 +134,7 @@ class _Rows:
         return tables
 
     def gone_on_with(self, first: int, count: int) -> _Rows:
-        """Return this memory, extended to `count` rows, or a larger copy if the spare rows are not free."""
+        """Return this memory with `count` rows; if its spare rows are not free, return a larger copy."""
         with _lock:
             rows = self
             if self.count != first or count > self.most:
@@ -243,7 +243,7 @@ def tables_of(
 
 
 class TableCache(dict[tuple[Any, ...], Made]):
-    """A cache of the latest tables of a structure, by parameters, mode vectors and horizon."""
+    """Caches the latest tables of linear modes; the key contains parameters, modes and segment length."""
 
     size = 0  # bytes of all tables
 

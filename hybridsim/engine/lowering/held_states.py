@@ -65,7 +65,7 @@ class HeldStates:
     # -- which ----------------------------------------------------------------------------------------------
 
     def _linear_in(self, c: Held) -> list[int]:
-        """Return the states in which a constraint is linear with a state-free coefficient, in order of preference.
+        """Return the states for which a constraint can be solved, with the preferred state first.
 
         For the rate of a gap, velocities come before positions.
         """
@@ -288,7 +288,7 @@ class HeldStates:
 
 
 def _label(c: Held) -> str:
-    """Return the label of a constraint in names of the program."""
+    """Return the name of a constraint inside the generated program."""
     return f"{c[0]}" if c[1] == 0 else f"{c[0]}r"
 
 

@@ -19,7 +19,7 @@ Force = Callable[[Lowering, Any, int], Any]
 
 
 def speed_name(k: int) -> str:
-    """Return the program's name of the approach speed at surface `k`."""
+    """Return the name of the approach speed at surface `k` in the generated program."""
     return f"speed_{k}"
 
 
@@ -63,7 +63,7 @@ def numbered(values: Iterable[Any]) -> Rows:
 
 
 def slopes_and_growth(lowering: Lowering, force: Force, count: int) -> Iterator[Any]:
-    """Return d(u_k)/dx and d(rates)/d(unknown_k), then the derivatives of friction forces by normal forces.
+    """Yield derivatives that impacts need: of the unknowns, of the rates and of the friction forces.
 
     force : a friction force by component, surface and number, from 0 to `count`.
     """

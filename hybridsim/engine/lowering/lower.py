@@ -53,7 +53,7 @@ class Lowering(LoweringState):
     """The steps that convert a `Model` to a `Program`."""
 
     def signal(self, index: int) -> Any:
-        """Return the current piece of an input as an expression in local time."""
+        """Return an input as an expression in local time, which is valid until its next knot."""
         sp = self.sp
         declared = self.model.inputs[index]
         if (kind := declared.kind) == "connected":
@@ -67,7 +67,7 @@ class Lowering(LoweringState):
         return c[5] + c[3] * sp.sin(c[0] + d * (c[1] + d * c[2]))
 
     def lower(self) -> Program:
-        """Run all steps, and return the program."""
+        """Convert the model to a program by all steps of the lowering."""
         model, sp = self.model, self.sp
         self.definitions = definitions = {self.symbols[n]: self.convert(e) for n, e in model.definitions}
         # substituting a cycle of definitions would not end
@@ -151,7 +151,7 @@ class Lowering(LoweringState):
                 )
 
     def _foreign(self, e: Any) -> list[Any]:
-        """Return the names in an expression whose values depend on a mode."""
+        """Return those names in an expression that have different values in different modes."""
         allowed = self.parameters | set(self.states) | {self.t, self.s}
         allowed |= {self.symbols[d.name] for d in self.model.discrete}
         return [n for n in e.free_symbols - allowed if n.name.startswith("v_")]
@@ -221,7 +221,7 @@ class Lowering(LoweringState):
         return items, clusters
 
     def _blends(self) -> dict[Any, Any]:
-        """Return the variables that surfaces set, as expressions of the unknowns, valid in all modes."""
+        """Return formulas, valid in all modes, of the variables that surfaces set."""
         found: dict[Any, Any] = {}
         for component in self.components:
             if component.surface and component.surface.unique:
@@ -351,7 +351,7 @@ class Lowering(LoweringState):
         return items, conditions
 
     def _count_phases(self) -> None:
-        """Register the frequencies that occur only in resets and outputs, before the phases are numbered."""
+        """Convert all resets and outputs, so that their frequencies are known before phases are numbered."""
         choices = [c for k in self.components for m in k.modes for g in m.guards for c in g.then]
         choices += [k.limit for k in self.components if k.limit]
         for part in (*choices, *self.model.monitors, *self.model.schedules):

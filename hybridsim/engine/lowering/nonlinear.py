@@ -1,4 +1,4 @@
-"""This module creates the errors for forces and relays that enter the rates nonlinearly."""
+"""This module creates the error messages for forces and relays that enter the rates nonlinearly."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from hybridsim.expr.simplify import simplified
 
 
 def refuse_powers(lowering: LoweringState, unknown: dict[int, Any], rates: list[Any]) -> None:
-    """Raise an error if a rate is nonlinear in a surface's name, because Filippov's rates would differ."""
+    """Raise an error if a rate is nonlinear in the sign of a surface, because Filippov's rates would differ."""
     for c, u in unknown.items():
         for x, rate in zip(lowering.states, rates, strict=True):
             component = lowering.components[c]

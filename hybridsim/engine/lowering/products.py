@@ -17,7 +17,7 @@ from hybridsim.engine.lowering.program import Assign, Item, Switch
 
 
 class Products:
-    """The values of unknowns in products, and the pairs of unknowns whose surfaces are never held together."""
+    """The values that unknowns have inside products, and the pairs of surfaces that are never held together."""
 
     def __init__(self, lowering: LoweringState, unknown: dict[int, Any]) -> None:
         self.lowering, self.unknown = lowering, unknown
@@ -63,13 +63,13 @@ class Products:
         return found
 
     def not_together(self, c: int, pull: Any) -> Any:
-        """Return the attraction of surface `c`, which becomes negative while another factor of its products is held."""
+        """Make the attraction of surface `c` negative while another factor of its products is held."""
         for d in sorted({e for pair in self.pairs if c in pair for e in pair} - {c}):
             pull = pull * (1 - self._holds(d)) - self._holds(d)
         return pull
 
     def diagonal(self, c: int, entry: Any) -> Any:
-        """Return the effect of unknown `c` on surface `c`, plus 1 for each factor of its products held with `c`."""
+        """Return the effect of unknown `c` on its own surface, corrected for products of unknowns."""
         return entry + sum(
             self._holds(c) * self._holds(d)
             for d in sorted({e for p in self.pairs if c in p for e in p} - {c})

@@ -53,7 +53,7 @@ def stop_couplings(
 def without_share(
     lowering: LoweringState, pairs: list[StopCoupling], c: int, d: int, entry: Any, of_held: Any
 ) -> tuple[list[Item], Any]:
-    """Return an entry of contact `c` and its program items; the entry is `of_held` while a gap along `c` is closed."""
+    """Return one coefficient of contact `c`, which is `of_held` while a gap along this contact is closed."""
     items: list[Item] = []
     for tie in pairs:
         if tie.along == c:
@@ -69,7 +69,7 @@ def without_share(
 def coupling_help(
     lowering: LoweringState, pairs: list[StopCoupling], p: int, effect: dict[tuple[int, int], Any]
 ) -> tuple[list[Item], Any]:
-    """Return the pull of sticking friction that keeps a gap closed, and the items that compute it."""
+    """Return the friction force that helps to keep a gap closed in stick, with the items that compute it."""
     sp, total = lowering.sp, lowering.sp.Integer(0)
     items: list[Item] = []
     for tie in pairs:

@@ -30,7 +30,7 @@ def _taking_part(
     recorded: Any,
     participants: Any,
 ) -> tuple[int, int, bool]:
-    """Return the numbers of participants and of components among them, and whether every event has one participant.
+    """Return the number of participants of some events, and the number of components among them.
 
     A participant is a component that changes its mode or is reset, a monitor, or a schedule that is due.
     due_start, due: the schedules of each kind of known time. recorded (2 M,): the directions, down and up, that each
@@ -63,7 +63,7 @@ def _taking_part(
 
 @kernel
 def _times_at(instants: Any, participants: Any, first: int, component: int, times: Any) -> int:
-    """Write the times of a component's events from a given event on, and return the number of these events."""
+    """Write the times of a component's events, starting with a given event, and return how many there are."""
     count = 0
     for i in range(first, participants.shape[1]):
         if participants[1, i] == component:
@@ -75,7 +75,7 @@ def _times_at(instants: Any, participants: Any, first: int, component: int, time
 
 @kernel
 def _states_at(states: Any, participants: Any, first: int, component: int, side: int, out: Any) -> int:
-    """Write the states on one side of a component's events, and return how many events there are."""
+    """Write the states before or after the events of one component, and return how many events there are."""
     count = 0
     for i in range(first, participants.shape[1]):
         if participants[1, i] == component:
@@ -187,7 +187,7 @@ class EventBlock(Sequence[Occurrence]):
         return named + [(schedule.name, SCHEDULED) for schedule in model.schedules]
 
     def transitions(self, first: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return instants (k, 2) and states (k, 2, n) of the transitions from a given event on."""
+        """Return instants (k, 2) and states (k, 2, n) of the transitions, starting with a given event."""
         has_corners = len(self._system.declared) < len(self._system.automata)
         has_others = self.changes < self._count
         if self._is_plain and not (has_corners or has_others):
@@ -201,7 +201,7 @@ class EventBlock(Sequence[Occurrence]):
         return self._instants[events], self._states[events]
 
     def since(self, first: int) -> EventBlock:
-        """Return a block of the events from a given number on."""
+        """Return a block of the events, starting with the event of a given number."""
         later = copy(self)
         later._first += first
         return later

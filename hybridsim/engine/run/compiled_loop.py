@@ -108,7 +108,7 @@ class CompiledLoop:
         self.renew()
 
     def pass_monitors(self, corners: MonitorCorners) -> None:
-        """Use this loop, whose system has corners in place of monitors, as the loop of the system with monitors."""
+        """Let this loop, which treats monitors as corners, record monitor events of the original model."""
         self.corners, self.system, self.kernels.recorded = corners, corners.plain, corners.plain
 
     def look_ahead(self, timetable: Timetable, end: Instant) -> None:
@@ -155,7 +155,7 @@ class CompiledLoop:
         self.used = (rows, segments)
 
     def go(self, origin: Instant, state: HybridState, target: Instant) -> KernelRun | None:
-        """Call the kernel without storing the result in the trajectory; return None if this is impossible."""
+        """Call the kernel without storing the result in the trajectory; return None if compiled code cannot run."""
         kernels, tape_cache = self.kernels, self.tape_cache
         tapes = tape_cache.with_modes(state.z)
         known = kernels.part_of(self.times_ahead.after(origin).up_to(target)) if self.times_ahead else None
@@ -229,7 +229,7 @@ class CompiledLoop:
     def advance(
         self, origin: Instant, outcome: Outcome, p: np.ndarray, target: Instant, record: Trajectory
     ) -> LoopResult:
-        """Run until an event needs Python, the target is reached, or arrays are full; store the result."""
+        """Run until the target is reached, the arrays are full, or an event needs the Python code; store the result."""
         run, self.kernel_run = self.kernel_run, None
         if run is None:
             state = HybridState.of(outcome, p) if self.corners is None else self.corners.state(outcome, p)
@@ -267,7 +267,7 @@ class CompiledLoop:
         return True
 
     def segments_of(self, run: KernelRun) -> SegmentBlock:
-        """Return the segments of one call. The call must have stored segments, and must not have released any."""
+        """Return the segments that one call of the compiled loop has stored."""
         rows, begun = run.rows, slice(run.first, run.first + run.count)
         rows.last_steps[run.first] = 0
         steps = slice(run.first_step, run.first_step + run.steps)

@@ -97,7 +97,7 @@ class LoopRecord(NamedTuple):
 
 
 class SegmentStart(NamedTuple):
-    """The input of a segment kernel that is passed by value, in contrast to the rows of the record."""
+    """The start of a segment, as the compiled loop passes it to a segment kernel."""
 
     mode_row: int  # row of its modes in the tapes
     bound: float  # local time at which it ends at the latest
@@ -106,7 +106,7 @@ class SegmentStart(NamedTuple):
 
 
 class SegmentEnd(NamedTuple):
-    """The result of a segment kernel; fields after `outcome` have values only if `outcome` is FOLLOWED.
+    """The result of a segment kernel: its outcome, and the data of the event at the end.
 
     The fields from `at` on have values only if a guard fired.
     """
@@ -131,7 +131,7 @@ def not_followed(outcome: int) -> SegmentEnd:
 
 @inline_always
 def end_without_event(call: Any, state: Any, work: Any, s: float, is_divided: bool) -> int:
-    """Adopt the states at the end of the last segment of a call, and return the reason for this end.
+    """Take over the states at the end of a call of the compiled loop, and return the reason for its end.
 
     A segment that is too long is divided: it goes on in the same modes, where active guards are positive.
     """
@@ -154,7 +154,7 @@ def end_without_event(call: Any, state: Any, work: Any, s: float, is_divided: bo
 def event_loop(
     segment: Any, model: Any, call: Any, state: Any, work: Any, record: Any, own: Any, rows: Any
 ) -> int:
-    """Run from event to event, integrate each segment by the kernel `segment`, and return why the loop ended.
+    """Run from event to event, integrate each segment by the kernel `segment`, and return the reason for the end.
 
     The numbers of committed steps and segments are in `call`. state: `StateArrays` at the start of the segment,
     advanced by the call, like the clock. work: `EventScratch`. record: `LoopRecord`. own, rows: packs of the method,

@@ -48,7 +48,7 @@ def record_layout(
 
 
 def skipped_rows(first: int, steps: int, count: int) -> tuple[int, ...]:
-    """Return how many rows at the start of each array are omitted; the last `count` arrays belong to the method."""
+    """Return how many leading rows of each array a call has to skip."""
     return (first, first, first, first + 1, first, first, *(steps,) * count)
 
 
@@ -127,7 +127,7 @@ class KernelRun:
         self._event_block: EventBlock | None = None
 
     def _array(self, name: str) -> np.ndarray:
-        """Return an array of the part of the record that is kept with the events."""
+        """Return an array of event data by its name."""
         return self.array_layout.array((None, self._event_memory), name)
 
     @cached_property
@@ -138,7 +138,7 @@ class KernelRun:
 
     @property
     def is_at_target(self) -> bool:
-        """Return whether the call reached its target, or a known time that is not ordinary."""
+        """Return whether the call ended at its target or at a known time that needs the Python code."""
         known = self.known
         return self.code == AT_TARGET and not (known and known.is_part and self.passed == len(known.kinds))
 
@@ -184,17 +184,17 @@ class KernelRun:
 
     @property
     def _has_guards_alone(self) -> bool:
-        """Return whether guards of the model ended all segments."""
+        """Return whether all segments ended at guards of the model."""
         return not self.passed and self.corners is None
 
     @property
     def _have_fired(self) -> np.ndarray:
-        """Return for each segment whether a guard ended the segment, and not a known time or a monitor."""
+        """Return a mask of the segments that a guard has ended."""
         fires = self._fires[self._ended]
         return np.asarray((fires >= 0) & (fires < self.system.guard_count))
 
     def plain_modes(self, modes: np.ndarray) -> np.ndarray:
-        """Return modes (k, C) without the modes of the corners of monitors."""
+        """Remove the columns of corners that represent monitors from modes (k, C)."""
         return modes if self.corners is None else np.ascontiguousarray(modes[:, : len(self.system.automata)])
 
     def outcome(self) -> Outcome:

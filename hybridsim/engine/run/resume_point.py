@@ -29,7 +29,7 @@ _Now = tuple[Instant, HybridState, tuple[int, int], MethodKernels]
 
 
 class ResumePoint:
-    """A point between two steps of a run, from which the next step starts; the point never changes.
+    """A point between two steps of a run, from which the next step starts; the object never changes.
 
     Parameters
     ----------
@@ -142,7 +142,7 @@ class ResumePoint:
         return ResumePoint(self.setup, self.task, self._before, counters, (end, run.end, used, kernels))
 
     def changed(self, discrete: np.ndarray) -> ResumePoint | None:
-        """Return the point after a change of discrete values that changes no mode, or None if a mode may change."""
+        """Return the point after a change of discrete states, or None if this change may change a mode."""
         if self.now is None:
             return None
         instant, state, used, kernels = self.now

@@ -94,7 +94,7 @@ class _FailedCall:
         self.place, self._error = place, error
 
     def look_ahead(self, *_: Any) -> None:
-        """Do nothing, because the call that raises the error processes no known times."""
+        """Do nothing, because a failed call has no known times to process."""
 
     def advance(self, *_: Any) -> Any:
         """Raise the error of the failed call."""

@@ -72,7 +72,7 @@ class ModeTape:
 
 
 class _Expansion(Trace):
-    """The Taylor coefficients of every register up to an order, as values of the code."""
+    """Writes code for the Taylor coefficients of every register."""
 
     def __init__(self, tape: ModeTape, order: int, stride: int, is_known: bool = False) -> None:
         super().__init__("v" if is_known else "u", interpreter, advance=self.advance)
@@ -105,14 +105,14 @@ class _Expansion(Trace):
         return self.read("%c", r * self.stride) if k == 0 else 0.0
 
     def write(self, array: str, registers: Iterable[int], size: int) -> None:
-        """Write code that stores the first coefficients of some registers, one register after another."""
+        """Return a different state for each constraint without projection, or None if there is no such choice."""
         for i, r in enumerate(registers):
             for k in range(size):
                 self.store(written(self.V[r, k]), array, i * size + k)
 
 
 def _expanded(tape: ModeTape, order: int, stride: int, is_known: bool = False) -> _Expansion:
-    """Return the code that expands the states %x at the local time %s."""
+    """Write code for the Taylor coefficients of all registers, from the states %x at the local time %s."""
     code = _Expansion(tape, order, stride, is_known)
     return code.expand(Value(code, "%s"), [code.read("%x", i) for i in range(len(tape.states))], order)
 
@@ -198,7 +198,7 @@ def sizes_function(name: str, guards: int, order: int) -> str:
 
 
 def _start(tape: ModeTape, stride: int) -> _Expansion:
-    """Return code that computes coefficient 0 in the order of the tape, and stores costly values for reuse."""
+    """Write code for the values of all registers, and for the storage of expensive values."""
     return _in_fixed_order(_expanded(tape, 0, stride))
 
 
@@ -213,7 +213,7 @@ def _in_fixed_order(code: _Expansion) -> _Expansion:
 
 
 def ends_text(tape: ModeTape, terms: int, first: int, order: int) -> str:
-    """Return a module with the functions ends_0, first_0, along_0 and values_0.
+    """Return the text of a module that computes the ends of Runge-Kutta steps in one combination of modes.
 
     ends_0 has the given number of terms. first_0 expands the states up to the order `first`; see
     `short_function`. along_0 expands the guards up to the last order; see `along_function`.
@@ -229,7 +229,7 @@ def ends_text(tape: ModeTape, terms: int, first: int, order: int) -> str:
 
 
 def series_text(tape: ModeTape, order: int) -> str:
-    """Return a module with series_0, values_0, ahead_0 and sizes_0; raise TooLong for a module that is too long."""
+    """Return the text of a module that computes Taylor series of one combination of modes."""
     parts = (
         series_function("series_0", tape, order),
         values_function("values_0", tape, order + 1),

@@ -45,7 +45,7 @@ class _Scaled:
     is_negative: bool = False
 
     def row(self, kind: int, out: int) -> Row:
-        """Return the instruction that computes the multiple."""
+        """Return the instruction that computes this scaled value."""
         operands, flags = [0, 0], NEGATIVE if self.is_negative else 0
         for i, (register, divides) in enumerate(self.constants):
             operands[i] = register
@@ -58,7 +58,7 @@ class _Scaled:
 def high_rows(
     rows: Sequence[Row], states: Sequence[int], rates: Sequence[int], guard_registers: Iterable[int]
 ) -> list[Row]:
-    """Return the rows that compute the states and the guards at high orders."""
+    """Return instructions that compute states and guards at high orders of the Taylor series."""
     made = _Rewriting(rows, states, rates, set(guard_registers))
     integrals = [made.scaled(rate).row(INTEGRATE, state) for state, rate in zip(states, rates, strict=True)]
     live = live_rows(made.rows, made.guard_registers | {row[1] for row in integrals})
@@ -66,7 +66,7 @@ def high_rows(
 
 
 class _Rewriting:
-    """Rewrites operations to shorten sequences of scalings and sums, except operations that guards need."""
+    """Rewrites instructions so that fewer operations in a row lead to the rates."""
 
     def __init__(
         self, rows: Sequence[Row], states: Sequence[int], rates: Sequence[int], guard_registers: set[int]
@@ -99,7 +99,7 @@ class _Rewriting:
         return self._forms.get(register, _Scaled(register))
 
     def _cycles_after(self, cycles: dict[int, int]) -> dict[int, int]:
-        """Return the processor cycle at which each register is computed, given the cycles of the states."""
+        """Compute the processor cycle at which each register is available."""
         for row in self._of.values():
             op, out = row[0], row[4]
             wait = _EARLY if op == ops.SINCOS_LINEAR else 0 if op in _SAME else _WAITS.get(op, _PRODUCT)
@@ -149,7 +149,7 @@ class _Rewriting:
             total = to
 
     def _take_apart(self, row: Row) -> None:
-        """Record the terms of a sum with their signs, and inner sums that no other operation reads.
+        """Find the terms of a sum with their signs; sums inside it that nothing else reads are expanded.
 
         A sum that has only negative terms stays unchanged.
         """

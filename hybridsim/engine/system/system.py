@@ -308,7 +308,7 @@ class System(_Frame):
         return out
 
     def jumps(self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """Return the jumps (2 m,) of the unknowns of m surfaces on release to above and to below."""
+        """Return the jumps (2 m,) of the unknowns of m surfaces after a release to either side."""
         out = np.zeros(2 * len(self.surface_of))
         self._in_python("jumps", s, x, p, z, out)
         return out
@@ -322,7 +322,7 @@ class System(_Frame):
     def impulses(
         self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return surface slopes (m, n), the effects of impulses on the states, and loads (2, m, m).
+        """Return derivatives of the surfaces (m, n), the effects of impulses on the states, and loads (2, m, m).
 
         u is the rate of a gap, or a relative velocity; see `hybridsim.engine.lowering.impulse_rows`.
         """
@@ -384,7 +384,7 @@ class System(_Frame):
     # -- series ---------------------------------------------------------------------------------------------
 
     def guards_of(self, z: np.ndarray) -> np.ndarray:
-        """Return the numbers of the active guards (components, widest), padded with -1."""
+        """Return the numbers (components, widest) of the active guards in the modes `z`, padded with -1."""
         return np.asarray(self.guard_table[self.component_numbers, z])
 
     def guard_title(self, guard: int, z: np.ndarray) -> str:
@@ -480,7 +480,7 @@ class System(_Frame):
         return out
 
     def _probing(self, p: np.ndarray) -> np.ndarray:
-        """Return a copy of the run-time vector for finite differences, in which a flag turns off error reports."""
+        """Return a copy of the run-time values in which errors of user functions are not reported."""
         p = p.copy()
         p[self.layout.pin_at] = 0.0
         return p

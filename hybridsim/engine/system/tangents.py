@@ -20,7 +20,7 @@ from hybridsim.engine.system.system import System
 
 @inlined
 def _combine(D: Any, out: int, first: float, a: int, second: float, b: int) -> None:
-    """Set D[out] = first * D[a] + second * D[b]; a zero derivative times an infinite factor is zero."""
+    """Set D[out] = first * D[a] + second * D[b], where zero times infinity is zero."""
     for j in range(D.shape[1]):
         total = 0.0
         if D[a, j] != 0.0:
@@ -32,7 +32,7 @@ def _combine(D: Any, out: int, first: float, a: int, second: float, b: int) -> N
 
 @kernel
 def _tangent(op: int, a: int, b: int, c: int, out: int, V: Any, D: Any) -> None:
-    """Apply the differentiation rule of one operation; all values V[register, 0] are known."""
+    """Compute the derivative of one operation from the derivatives of its operands."""
     u, v, y = V[a, 0], V[b, 0], V[out, 0]
     if op in (ops.ADD, ops.ADD_CONSTANT):
         _combine(D, out, 1.0, a, 1.0, b)
@@ -204,7 +204,7 @@ class TangentTape:
     def _along(
         self, s: np.ndarray, x: np.ndarray, p: np.ndarray, seeds: np.ndarray
     ) -> tuple[Tangents, np.ndarray]:
-        """Return values, derivatives by the rules of the operations, and a mask of points that may lack derivatives."""
+        """Return values, derivatives, and a mask of points at which the derivatives may not exist."""
         count, outputs, directions = self._registers.count, len(self._outputs), seeds.shape[1]
         values, slopes = np.empty((len(s), outputs + 1)), np.empty((len(s), outputs, directions))
         run_tangents(

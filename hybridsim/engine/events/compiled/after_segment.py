@@ -52,7 +52,7 @@ def state_errors(
 
 @inlined
 def spread(steps: int, rounding: float) -> float:
-    """Return the factor by which the rounding of the steps enlarges guard bounds, as in `add_steps`."""
+    """Return the factor by which rounding over several steps enlarges the error bounds of guards."""
     return 1.0 + 12.0 * steps + 0.5 * rounding
 
 
@@ -87,7 +87,7 @@ def fill_guard_series(model: Any, s: float, s_error: float, state: Any, work: An
 def is_hidden(
     model: Any, g: int, slope: float, bend: float, s: float, s_error: float, state: Any, work: Any
 ) -> bool:
-    """Return whether a guard starts to rise again before its size exceeds the rounding error of its expression.
+    """Return whether a guard turns and rises again before its size exceeds its rounding error.
 
     The state is that in the work space, at local time s.
     """

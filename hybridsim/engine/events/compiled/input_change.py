@@ -29,7 +29,7 @@ _LEAST = math.ulp(0.0)  # error of the time of zeros at an instant without an ev
 
 
 class SurfaceTape(NamedTuple):
-    """The instruction tape of one combination of modes, with the registers of surfaces that read discrete values."""
+    """The instruction tape of those surfaces that read discrete states, in one combination of modes."""
 
     constant: np.ndarray  # rows executed once per segment
     rows: np.ndarray

@@ -76,7 +76,7 @@ class _Collision:
         self.rates = dict.fromkeys(mine, 0.0)
 
     def run(self) -> tuple[Failure | None, bool]:
-        """Compute the impact; return the reason why the run ends, or None, and whether there was an impact."""
+        """Compute the impact; return a reason to end the run, or None, and whether there was an impact."""
         failure = self._measure()
         if failure:
             return failure, False
@@ -118,7 +118,7 @@ class _Collision:
         return _surfaces(self.resolution)
 
     def _join(self) -> None:
-        """Include the friction contacts at zero velocity, because their modes depend on the normal forces."""
+        """Add the friction contacts at zero velocity to the collision, because their modes depend on normal forces."""
         values, bounds = self._surfaces
         for c in self.cluster:
             k = self.place[c]

@@ -1,4 +1,4 @@
-"""Find when bounces end if rounding hides the last bounces.
+"""Find the time at which bounces end, if rounding hides the last bounces.
 
 A guard w leaves zero with w' = u > 0 and w'' = -g, for a flight of 2 u/g. The next flights last e, e**2, ... of it,
 with e the ratio of the speeds after and before, so that they take 2 u/(g (1 - e)) in total. A bounce loses
@@ -58,7 +58,7 @@ class _Forecast(NamedTuple):
 
 
 def bounces_of(outcome: Outcome, now: Instant, x_minus: np.ndarray) -> dict[int, Bounce]:
-    """Return the first transition of each component in the event that led to an outcome."""
+    """Return the first transition of each component in the event that led to the present state."""
     found: dict[int, Bounce] = {}
     for change in outcome.changes:
         bounce = Bounce(now, change.source, change.guard, change.target, x_minus, outcome.x)
@@ -67,7 +67,7 @@ def bounces_of(outcome: Outcome, now: Instant, x_minus: np.ndarray) -> dict[int,
 
 
 def last_bounces(system: System, happened: Sequence[Occurrence]) -> dict[int, Bounce]:
-    """Return the last recorded event as bounces of its components, or no bounces for a schedule or a clock tick."""
+    """Return the last recorded event as a bounce of each component that it belongs to."""
     last = next((o for o in reversed(happened) if o.kind != "monitor"), None)
     components = [
         c for c, automaton in enumerate(system.automata) if last and automaton.name == last.component
@@ -104,7 +104,7 @@ def may_be_hidden(system: System, outcome: Outcome, happened: Sequence[Occurrenc
 
 
 def _barely_seen(system: System, outcome: Outcome, bounces: dict[int, Bounce]) -> dict[int, _Departure]:
-    """Return the departures from zero after which flights are so short that rounding may hide the loss of speed."""
+    """Return the starts of flights that are so short that rounding may hide their loss of speed."""
     found = {}
     for c, last in bounces.items() if system.has_tape else ():
         automaton = system.automata[c]
@@ -120,7 +120,7 @@ def _barely_seen(system: System, outcome: Outcome, bounces: dict[int, Bounce]) -
 def _agreed(
     system: System, outcome: Outcome, c: int, best: _Forecast, speed: float, last: Bounce, record: Trajectory
 ) -> tuple[float, int]:
-    """Return the earliest forecast that agrees with all later forecasts, and the number of forecasts that agree."""
+    """Return the earliest forecast that agrees with all later ones, and how many of them agree."""
     count = 1
     for bounce in _backward(system.automata[c], last, record):
         departure = _departure(system, outcome, c, bounce)

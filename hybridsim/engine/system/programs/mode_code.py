@@ -51,7 +51,7 @@ def mode_tape(system: System, z: np.ndarray) -> ModeTape:
 
 
 def _holding(system: System, z: np.ndarray) -> Iterator[int]:
-    """Yield the registers of the condition that held states follow from constraints, which is true in every mode."""
+    """Yield the registers of a condition that is always true: held states are computed from constraints."""
     tape = system.code.data["tape"]
     zeros = [register for register, value, _ in tape["constants"] if value == 0.0]
     pins = [register for register, source in tape["parameters"] if source == system.layout.pin_at]
@@ -62,7 +62,7 @@ def _holding(system: System, z: np.ndarray) -> Iterator[int]:
 
 
 def computed_rates(system: System, z: np.ndarray) -> list[bool]:
-    """Return for each state whether an instruction computes its rate; a constant, held or copied rate needs none."""
+    """Return a mask of the states whose rates an instruction computes; other rates are constant, held or copied."""
     tape, sure = system.optimised_tape(z), frozenset(_holding(system, z))
     rows = tape.rows
     chosen = {out: b for _, a, b, _, out in rows[rows[:, 0] == SELECT].tolist() if a in sure}
@@ -76,7 +76,7 @@ def computed_rates(system: System, z: np.ndarray) -> list[bool]:
 
 
 def fading(system: System, z: np.ndarray) -> list[int]:
-    """Return the arguments of functions that may vanish, encoded as register, power and kind.
+    """Return codes of the function arguments that may become zero within a step, such as roots.
 
     See `hybridsim.engine.roots.vanishing_terms`.
     """
@@ -167,7 +167,7 @@ class ModeCompiler:
         self._absent: set[int] = set()  # modes whose code is not on disk
 
     def prepare(self, modes: np.ndarray, lacked: np.ndarray, put: Callable[[int, list[int]], None]) -> None:
-        """Compile code for modes with many steps; `put(k, addresses)` receives the result."""
+        """Compile code for modes in which many steps were taken, and pass the addresses to `put`."""
         counts = lacked.tolist()
         if not ENABLED or max(counts, default=0) < KNOWN:
             return

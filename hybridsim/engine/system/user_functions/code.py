@@ -190,7 +190,7 @@ class PythonCode:
     # -- functions called once per event, in plain Python ---------------------------------------------------
 
     def _choose(self, s: float, x: Any, p: Any, z: Any, out: Any) -> int:
-        """Return the branch of a guard, as the generated function `choose` does."""
+        """Write the number of the first true condition of a guard to `out`."""
         c, m, g = (int(k) for k in z[-3:])
         out[0] = -1.0
         for k, condition in enumerate(self.conditions[c, m, g]):
