@@ -185,7 +185,7 @@ class _Sides:
         return off
 
     def _passed(self, c: int, both: list[Changed], above: np.ndarray, below: np.ndarray) -> list[OffZero]:
-        """Describe how a surface that the run crosses affects the derivatives.
+        """Describe how a surface that the run leaves affects the derivatives.
 
         On the other side, directions with impulses do not return by themselves.
         """

@@ -26,7 +26,7 @@ def refuse(solution: Solution) -> None:
 
 
 def _refuse_limits(solution: Solution) -> None:
-    """Raise an error for a run in which the limit of accumulating events was not computed."""
+    """Raise an error for a run in which accumulating events were not resolved down to rounding errors."""
     components = {component.name: component for component in solution.components}
     before = solution.t_start
     for event in solution.events:

@@ -99,13 +99,13 @@ class _Expansion(Trace):
                 self.on_all_paths(self.run.advance, rows[r : r + 1], (V,), k)
 
     def _constant(self, r: int, k: int) -> Value | float:
-        """Return coefficient k of a constant, as a value of the code."""
+        """Return coefficient k of a constant, as a symbolic value."""
         if (r, 0) in self.V.known and r != self.tape.time:
             raise LookupError(f"coefficient {k} of register {r} is not computed")
         return self.read("%c", r * self.stride) if k == 0 else 0.0
 
     def write(self, array: str, registers: Iterable[int], size: int) -> None:
-        """Return a different state for each constraint without projection, or None if there is no such choice."""
+        """Write code that stores the first coefficients of some registers, one register after another."""
         for i, r in enumerate(registers):
             for k in range(size):
                 self.store(written(self.V[r, k]), array, i * size + k)

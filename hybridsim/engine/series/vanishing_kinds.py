@@ -1,4 +1,4 @@
-"""This module encodes functions whose leading Taylor coefficients may be zero although they change later."""
+"""This module encodes functions, such as exponentials, that may be below rounding except in a narrow pulse."""
 
 from __future__ import annotations
 

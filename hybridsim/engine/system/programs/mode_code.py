@@ -76,7 +76,7 @@ def computed_rates(system: System, z: np.ndarray) -> list[bool]:
 
 
 def fading(system: System, z: np.ndarray) -> list[int]:
-    """Return codes of the function arguments that may become zero within a step, such as roots.
+    """Return codes for functions that may be below rounding in a Taylor series, such as exponentials.
 
     See `hybridsim.engine.roots.vanishing_terms`.
     """
