@@ -13,7 +13,7 @@ _ESCAPES = {"<": "\\u003c", ">": "\\u003e", "&": "\\u0026"}
 
 
 def array(values: Any, kind: str) -> dict[str, str]:
-    """Return an array for the page; `kind` is the type of NumPy without the byte order, such as "f8"."""
+    """Return an array as text for the HTML page; `kind` is its NumPy type without the byte order, such as "f8"."""
     data = np.ascontiguousarray(values, dtype=f"<{kind}")
     return {"kind": kind, "bytes": b64encode(data.tobytes()).decode("ascii")}
 

@@ -293,7 +293,7 @@ class Rewriting(RewritingState):
         return self._met[id(node)][1]
 
     def _is_limited(self, branch: ast.expr, argument: ast.expr, family: Family, sign: int) -> bool:
-        """Return whether one side, such as a root, may be undefined beyond the border."""
+        """Return whether the expression of one side, such as a root, may have no value on the other side."""
         border = names_of(self.meanings.written_out(argument)) & self.meanings.moving
         side = resolved(self.meanings, branch, {family: sign})
         return any(names_of(base) & border for base in limited(side, self.meanings))
