@@ -146,7 +146,7 @@ def _modes(system: Any, declared: Mapping[str, str] | None) -> np.ndarray:
         mode = z.get(automaton.name)
         if mode is None and automaton.initial < 0:
             raise UsageError(
-                f"`z` needs a mode of {automaton.name}, which has no initial mode",
+                f"component {automaton.name} has no initial mode, so `z` must contain its mode",
                 remedy=f"use one of {', '.join(automaton.modes)}",
             )
         if mode is None:

@@ -184,7 +184,7 @@ def _write(solution: Solution, args: argparse.Namespace, session: Session) -> No
         session.wrote(args.npz)
     if solution.t_end == solution.t_start:
         if args.plot or args.animate:
-            complain("no picture was written, because the run ends where it begins")
+            complain("no picture was written, because the run has zero length")
         return
     if args.plot:
         from hybridsim.plot import save, time_history

@@ -73,10 +73,10 @@ def _finite(node: ast.expr, function: Callable[..., float], *arguments: float) -
     except ZeroDivisionError:
         raise NoValue(node, "division by zero") from None
     except OverflowError:
-        raise NoValue(node, "too large for a double") from None
+        raise NoValue(node, "the result is too large for a double") from None
     except ValueError:
         shown = ", ".join(f"{argument:g}" for argument in arguments)
-        raise NoValue(node, f"not defined at ({shown})") from None
+        raise NoValue(node, f"the function is not defined at ({shown})") from None
     if not math.isfinite(value):
         raise NoValue(node, f"the result is {value}")
     return value

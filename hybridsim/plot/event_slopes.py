@@ -38,7 +38,7 @@ def event_slopes(
     if not len(result.times):
         raise UsageError(
             "the run has no events, so there are no event times to draw",
-            remedy="print the sensitivities for the derivatives of the end of the run",
+            remedy="print the sensitivities, which also contain the derivatives of the final state",
         )
     known = {**dict.fromkeys(result.states), **dict.fromkeys(result.parameters)}
     slopes = dict(zip(known, np.hstack([result.times_by_start, result.times_by_parameter]).T, strict=True))
@@ -51,7 +51,8 @@ def event_slopes(
         panels = tuple(axes)
     if len(panels) != len(chosen):
         raise UsageError(
-            f"{len(panels)} axes were passed for {len(chosen)} names", remedy="use one axes per name"
+            f"{len(panels)} axes were passed for {len(chosen)} names",
+            remedy="pass one Matplotlib axes for each name",
         )
     for panel, name in zip(panels, chosen, strict=True):
         panel.vlines(result.times, 0.0, slopes[name], color=style.PALETTE[0], linewidth=0.9)

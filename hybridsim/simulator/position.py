@@ -183,7 +183,7 @@ def _follow(
     if record.status not in ("finished", "terminated"):
         raise SimulationError(
             f"{position.run.model.name}: {record.status}, {record.message}",
-            remedy="call sim.restore() or sim.start(); the simulator is now just after the last event that succeeded",
+            remedy="call sim.restore() or sim.start(); the simulator is now just after the last completed event",
         )
 
 

@@ -31,7 +31,7 @@ def resumed(
         )
     end = task.t1 if t_end is None else arguments.number(t_end, "t_end")
     if not math.isfinite(end):
-        raise cannot_be("t_end", t_end, "use a finite time; a monitor can end a run early")
+        raise cannot_be("t_end", t_end, "use a finite time; add a monitor if the run should end earlier")
     sign = 1.0 if task.t1 >= task.t0 else -1.0
     if t_end is None and solution.status == "finished":
         raise UsageError(

@@ -67,8 +67,8 @@ class Solution(InPictures):
             raise UsageError(
                 f"{self.model.name} is a MechanicalSystem, whose runs cannot be saved, resumed, explained or "
                 "differentiated",
-                remedy="simulate system.to_model() (if the contact velocities are independent); to_npz() writes the "
-                "table and the events, and a new run can start from x0=sol.x_end",
+                remedy="simulate system.to_model() (if the contact velocities are independent), write the table "
+                "and the events with to_npz(), or start a new run from x0=sol.x_end",
             )
         return self._trajectory
 

@@ -86,5 +86,5 @@ class ProcessorTime:
             self._began = now
         elif now - self._began >= self.seconds:
             raise LimitReached(
-                f"{now - self._began:.3g} s of processor time are used, but only {self.seconds:g} s are allowed"
+                f"{now - self._began:.3g} s of processor time were used, but only {self.seconds:g} s are allowed"
             )

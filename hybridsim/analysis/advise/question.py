@@ -189,7 +189,7 @@ def stuck(motion: Measures, contact: str) -> float:
 
 def _of(values: Any, name: str, head: str) -> float:
     if name not in values:
-        raise NoAnswer(f"the motion has no value of {head}.{name}")
+        raise NoAnswer(f"the motion has no value {head}.{name}")
     return float(values[name])
 
 
@@ -272,7 +272,7 @@ def question_of(model: Model, quantity: Any, t_span: tuple[float, float] | None,
         if t_span is not None or rest:
             raise UsageError(
                 f"`quantity` cannot be {quantity!r}",
-                remedy="use 'period' alone, without `.` and a name, and without `t_span`",
+                remedy="use 'period' without a name after it and without `t_span`",
             )
         return Question(quantity, None, None, accuracy)
     names = _names(model, head)

@@ -111,7 +111,7 @@ def equilibria(
         )
     if is_driven(system):
         raise UsageError(
-            f"model {model.name} is forced in time: there is no equilibrium",
+            f"model {model.name} has forcing that varies with time, so there is no equilibrium",
             remedy="use hs.steady_state for a periodic forcing, hs.linearize to freeze the forcing at one time, or "
             "give the model the final value of the forcing as a constant",
         )

@@ -103,7 +103,7 @@ def fit(
     refuse_unknown([simulate], options)
     for name in ("t_eval", "keep", "save", "params", "x0", "progress"):
         if name in options:
-            raise UsageError(f"a fit sets {name!r} itself", remedy="describe the experiment by hs.Record")
+            raise UsageError(f"a fit sets {name!r} itself", remedy="describe the experiment with hs.Record")
     if text(loss, "loss") not in _LOSSES:
         raise UsageError(f"`loss` is {loss!r}", remedy=f"use one of {', '.join(_LOSSES)}")
     count = 1 if starts is None else whole_number(starts, "starts", 1, 10_000)

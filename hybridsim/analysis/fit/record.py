@@ -185,8 +185,8 @@ def _columns(
     for quantity, count in Counter(chosen.values()).items():
         if count > 1:
             raise UsageError(
-                f"`quantities` has {count} columns of {quantity}",
-                remedy="use one record for each column, or an output of the model for each sensor",
+                f"`quantities` assigns {count} columns to {quantity}",
+                remedy="use a separate record for each column, or declare an output in the model for each sensor",
             )
     if "t" in names and "t" not in chosen.values():
         chosen["t"] = "t"

@@ -38,5 +38,5 @@ class AtRest(LadderStep):
         need_contacts(scene.model)
         start = scene.model.start_values()
         if scene.model.discrete:
-            raise DoesNotApply("the model has discrete states, which change without motion")
+            raise DoesNotApply("the model has discrete states, which can change even if nothing moves")
         return Rest(start, scene.model.contacts)

@@ -49,7 +49,9 @@ class ConstantAtMeanSpeed(LadderStep):
         model = scene.model
         _need_velocity_law(model)
         if any(not scene.speed.get(contact.name) for contact in model.contacts):
-            raise DoesNotApply("nothing slides in the full motion, so there is no mean speed")
+            raise DoesNotApply(
+                "no contact slips in the motion of the full model, so there is no mean sliding speed"
+            )
         wishes = {f"{_MEAN}_{c.name}": scene.speed[c.name] for c in model.contacts}
         changed, names = with_parameters(model, wishes)
         return with_contacts(

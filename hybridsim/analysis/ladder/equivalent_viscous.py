@@ -128,7 +128,7 @@ def _by_runs(viscous: Model, scene: Scene, names: list[str]) -> Response:
             raise DoesNotApply(f"the model with dampers has no steady motion: {error.message}") from error
         if not steady.success or steady.multiple > 1:
             raise DoesNotApply(
-                f"the model with dampers has no motion of the forcing's period: {steady.message}"
+                f"the model with dampers has no periodic motion with the forcing period: {steady.message}"
             )
         found = np.array([steady.harmonic(name, 1) for name in velocities])
         for name, wave in zip(velocities, found, strict=True):
@@ -166,8 +166,7 @@ def _solve_one(balanced: Callable[[float], float], start: float) -> np.ndarray:
     low = start / _BELOW
     if balanced(low) < low:
         raise DoesNotApply(
-            "the harmonic balance has no solution with more than 1/1000 of the damping that is "
-            "estimated from the frictionless motion"
+            "the harmonic balance has no solution whose damping exceeds 1/1000 of its first estimate"
         )
     high = 2.0 * low
     while balanced(high) > high:

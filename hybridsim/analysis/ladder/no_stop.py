@@ -122,17 +122,20 @@ def held(model: Model) -> _Held:
     try:
         form = no_stops(r, zeta, f)
     except np.linalg.LinAlgError:
-        raise DoesNotApply(f"without damping the closed form has no solution at r = {r:.6g}") from None
+        raise DoesNotApply(
+            f"the closed form without damping has no solution at the frequency ratio r = {r:.6g}"
+        ) from None
     if not form.holds:
         raise DoesNotApply(
-            f"the motion stops: mu N/F0 = {f:.4g} is beyond the no-stop boundary at r = {r:.4g}"
+            f"the motion contains stops: mu N/F0 = {f:.4g} exceeds the limit for motion without stops at the "
+            f"frequency ratio r = {r:.4g}"
         )
     amplitude = form.amplitude * s.force / s.stiffness
     angle = _angle_at_top(s, amplitude)
     load = s.stiffness * amplitude - s.force * math.sin(angle)
     if load < s.stick_limit:
         raise DoesNotApply(
-            f"the motion stops: the load {load:.4g} at the turning points is below the stick limit"
+            f"the motion contains stops: at the turning points the load {load:.4g} is below the stick limit"
         )
     return _Held(found, amplitude, angle, s.damping > 0.0 and s.stick_limit == s.slip_force)
 

@@ -28,7 +28,9 @@ class OneCoefficient(LadderStep):
             raise DoesNotApply("the friction law of a contact is a table")
         jumps = [_jumps(model, contact) for contact in model.contacts]
         if not any(jumps):
-            raise NothingToDrop("static and kinetic friction are already equal at v = 0")
+            raise NothingToDrop(
+                "the static friction of every contact already equals its kinetic friction at v = 0"
+            )
         lowered = {c.name for c, jump in zip(model.contacts, jumps, strict=True) if jump}
         return with_contacts(model, lambda c: _lowered(c) if c.name in lowered else c, self.title)
 

@@ -19,7 +19,8 @@ class _Regularised(LadderStep):
         if v0 is None:
             if not scene.peak:
                 raise DoesNotApply(
-                    "nothing slides in the full motion, so there is no sliding speed for the choice of `v0`"
+                    "no contact slips in the motion of the full model, so no sliding speed is known from which "
+                    "`v0` can be computed"
                 )
             v0 = SHARE * scene.peak
         try:

@@ -54,7 +54,7 @@ class _Points:
         self.x, self.y = first[order], second[order]
         distinct = np.unique(self.x)
         if len(distinct) < 2:
-            raise UsageError("`at` has no two different numbers", remedy=_REMEDY)
+            raise UsageError("`at` contains fewer than two different numbers", remedy=_REMEDY)
         whole_number(count, "knots", 2, len(distinct))
         self.ends = distinct[[0, -1]]
         between = np.concatenate([distinct[1:-1], 0.5 * (distinct[1:] + distinct[:-1])])

@@ -134,7 +134,7 @@ def fit_laws(
     if not held and len(rows) > 1 and all(math.isinf(row.aicc) for row in rows):
         raise UsageError(
             f"{rows[0].fit.samples} samples are too few to rank the laws",
-            remedy="AICc needs two more samples than unknowns and quantities together; use more samples",
+            remedy="use more samples; AICc needs at least two more than the total number of unknowns and quantities",
         )
     rows.sort(key=_rank)
     return LawFits(model.title or model.name, contact, tuple(rows))

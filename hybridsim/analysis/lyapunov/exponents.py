@@ -144,7 +144,8 @@ def lyapunov_exponents(
     """
     if isinstance(model, MechanicalSystem):
         raise UsageError(
-            "`model` is a MechanicalSystem, whose changes are not followed", remedy="use model.to_model()"
+            "`model` is a MechanicalSystem, for which exponents are not supported",
+            remedy="use model.to_model()",
         )
     model = arguments.chosen_model(model, params)
     report = arguments.callback(progress)

@@ -117,7 +117,8 @@ class SteadySensitivities(Readable):
         names = quantities_of(reading, quantities)
         if TIME in names:
             raise UsageError(
-                "a reading of a periodic motion cannot contain t", remedy="use quantities that repeat"
+                "the time t cannot be measured in a periodic motion, because it does not repeat",
+                remedy="use periodic quantities",
             )
         over = self._over_time
         over.require(names)
@@ -158,8 +159,8 @@ def steady_sensitivities(
     near = np.abs(multipliers - 1.0)
     if len(near) and near.min() <= _NEUTRAL:
         raise UsageError(
-            f"the motion has the multiplier {multipliers[np.argmin(near)]:.9g}: it is in a family or at a fold, so "
-            "it has no derivatives by parameters",
+            f"the motion has the multiplier {multipliers[np.argmin(near)]:.9g}, which is too close to 1, so it has "
+            "no derivatives with respect to the parameters",
             remedy="use other parameters, or hs.sensitivities for a run from a fixed start",
         )
     states = (*solution.names, *(q.name for q in system.model.discrete))
@@ -216,8 +217,9 @@ def _relative_periods(
     apart = np.ptp(found, axis=0) > _ALIKE * np.abs(found).max(axis=0)
     if apart.any():
         raise UsageError(
-            f"a change of {' and '.join(np.array(parameters)[apart])} changes the periods of the forcing by different "
-            "factors, after which the motion does not repeat: it has no derivatives by these parameters",
+            f"a change of {' and '.join(np.array(parameters)[apart])} changes the forcing periods by different "
+            "factors, so that the motion no longer repeats; the motion has no derivatives with respect to these "
+            "parameters",
             remedy="request other derivatives, or write all periods as expressions of one parameter",
         )
     return np.asarray(found[0])

@@ -83,7 +83,8 @@ class Growth:
         change = np.concatenate([carried.x, carried.discrete]) / self.scale
         if not np.isfinite(change).all():
             raise SimulationError(
-                f"the motion has no derivative between t = {solution.t_start:.9g} and t = {solution.t_end:.9g}"
+                f"the derivatives of the motion are not finite between t = {solution.t_start:.9g} and t = "
+                f"{solution.t_end:.9g}"
             )
         return np.asarray(change)
 

@@ -446,7 +446,8 @@ def _refuse_what_ends(system: System) -> None:
     for declared in model.inputs:
         if declared.period is None:
             raise UsageError(
-                f"model {model.name} is driven by {declared.subject}, a {declared.kind}: there is no steady state",
+                f"model {model.name} is driven by {declared.subject}, which does not repeat (a {declared.kind}), so "
+                "there is no steady state",
                 remedy=f"use a periodic input, or replace the {declared.kind} by its final value",
             )
     for clock in model.schedules:

@@ -139,10 +139,10 @@ class _Describer:
             state = value.__reduce_ex__(4) if reduce is None else reduce(value)
         except Exception as error:  # a user's class may raise anything, and then it cannot be identified
             raise UsageError(
-                f"the measure uses an object of {type(value).__qualname__}, which a journal cannot identify: "
-                f"{error}",
-                remedy="sweep without a journal, or add to the class a method __getstate__ that returns "
-                "its content",
+                f"the measure uses an object of type {type(value).__qualname__}, which cannot be identified in a "
+                f"journal: {error}",
+                remedy="run the sweep without a journal, or give the class a method __getstate__ that returns its "
+                "content",
             ) from error
         if isinstance(state, str):
             return f"{_of_module(_module(value))}.{state}"

@@ -173,7 +173,7 @@ def _piece(line: Any) -> tuple[list[int], list[Outcome]]:
 def _outcome(row: Any) -> Outcome:
     is_pair = isinstance(row, list) and len(row) == 2
     if not (is_pair and isinstance(row[0], str) and isinstance(row[1], dict)):
-        raise ValueError("a result is not a status with values")
+        raise ValueError("a result is not a pair of a status and values")
     return Outcome(row[0], {name: _read_back(value) for name, value in row[1].items()} or None)
 
 

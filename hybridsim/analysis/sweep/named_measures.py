@@ -147,8 +147,7 @@ def named_measure(
         if AFTER in options and word in _OF_MOTION and word not in OF_MOTION:
             raise UsageError(
                 f"{word} belongs to a steady state, but `after` measures one period of an ordinary run",
-                remedy=f"remove {word} or `after`; the value 'residual' measures how far a run is from "
-                "repeating",
+                remedy=f"remove {word} or `after`; use 'residual' to measure how closely a run repeats",
             )
         if (f"{stem}.1" if is_harmonic else word) not in known:
             raise UsageError(
@@ -164,7 +163,7 @@ def _last_period(reading_names: tuple[str, ...], model: Model, options: dict[str
     if is_structure(model):
         raise UsageError(
             "`after` is not supported for a MechanicalSystem",
-            remedy="remove `after`: the readings are then those of the steady state",
+            remedy="remove `after` to measure the steady state",
         )
     after = whole(options.pop(AFTER), AFTER)
     for name in ("t_span", "keep", "save", "t_eval"):

@@ -57,6 +57,6 @@ def _reading(name: str, value: Any) -> Reading:
         except (TypeError, ValueError, OverflowError):
             pass
     raise UsageError(
-        f"the measure returned {type(value).__name__} as {name}",
+        f"the measure returned a value of type {type(value).__name__} for {name}",
         remedy="return a number, a one-dimensional array, or a dict whose values are numbers, texts or arrays",
     )

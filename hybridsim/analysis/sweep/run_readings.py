@@ -91,7 +91,7 @@ def of_run(reading_names: Sequence[str], model: Model, options: Mapping[str, Any
         if beyond is not None:
             raise UsageError(
                 f"`measure` {beyond!r} of a run is not supported for a MechanicalSystem",
-                remedy="use 'final', or remove `t_span`: the readings are then those of the steady state",
+                remedy="use 'final', or remove `t_span` to measure the steady state",
             )
     if not _are_final(reading_names):
         _refuse_parts(options)

@@ -89,7 +89,9 @@ class Section:
                     "it, or a contact sticks there"
                 )
             length *= 2.0
-        raise SimulationError(f"the section was crossed {len(found)} times, but {passages} are needed")
+        raise SimulationError(
+            f"the run crosses the section {len(found)} times, but {passages} crossings are needed"
+        )
 
 
 def sampling_period(model: Model) -> float:

@@ -164,8 +164,8 @@ def sweep(
     if after is not None:
         if warm_start:
             raise UsageError(
-                "`warm_start` and `after` cannot be combined, because `after` counts periods from the "
-                "model's own start",
+                "`warm_start` and `after` cannot be combined, because `after` counts periods from the initial "
+                "state of the model",
                 remedy="remove `warm_start` or `after`",
             )
         options["after"] = after

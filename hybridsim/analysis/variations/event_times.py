@@ -61,8 +61,8 @@ class EventTimes:
                 shifts += [] if shift is None else [shift]
         if not shifts:
             raise UsageError(
-                f"the cause of the change of {happened[0].component} at t = {float(happened[0].instant):.9g} is "
-                "unknown, so its time has no derivatives",
+                f"component {happened[0].component} changes at t = {float(happened[0].instant):.9g} for an unknown "
+                "reason, so the time of this change has no derivatives",
                 remedy="use other parameters, or a run that ends before this time",
             )
         first = shifts[0]
@@ -71,10 +71,9 @@ class EventTimes:
             for shift in shifts
         ):
             raise UsageError(
-                f"several events at t = {float(at):.9g} happen at different times after "
-                "a small change of the run "
-                f"({', '.join(sorted({*(o.component for o in happened), *(name for name, _ in knots)}))}), so there is "
-                "no derivative",
+                f"several events coincide at t = {float(at):.9g} "
+                f"({', '.join(sorted({*(o.component for o in happened), *(name for name, _ in knots)}))}), but "
+                "separate after a small change of the run, so there is no derivative",
                 remedy="use other parameters, or a run that ends before this time",
             )
         return first.values

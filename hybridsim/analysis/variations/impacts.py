@@ -131,9 +131,9 @@ class Impacts:
         """Return the matrix of the linear system of the impulses, and the impulses."""
         found = answers(problem)
         if len(found) != 1 or found[0].reduced:
-            what = "whose rebound was reduced to lose energy" if found else "without a unique outcome"
+            what = "whose rebound was reduced to lose energy" if found else "whose outcome is not unique"
             raise UsageError(
-                f"at t = {t:.9g} {names} have an impact {what}, through which derivatives are not supported",
+                f"derivatives are not supported through the impact of {names} at t = {t:.9g}, {what}",
                 remedy="use a run that ends before this time",
             )
         answer, k = found[0], problem.normal
@@ -174,6 +174,7 @@ def _refuse_undecided(
     moves = np.abs(d_impulses).max(axis=1, initial=0.0) > _SAME * np.abs(d_impulses).max(initial=0.0)
     if (border & moves).any():
         raise UsageError(
-            f"at t = {t:.9g} {names} have an impact exactly at the border of two outcomes, so there is no derivative",
+            f"at t = {t:.9g} {names} have an impact exactly on the border between two outcomes, so there is no "
+            "derivative",
             remedy="use other parameters, or a run that ends before this time",
         )

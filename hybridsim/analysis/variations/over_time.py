@@ -70,7 +70,7 @@ class OverTime:
         for name in names:
             if name not in self._known:
                 raise UsageError(
-                    f"model {self.solution.model.name} has no quantity {name!r}, which is in names",
+                    f"model {self.solution.model.name} has no quantity {name!r}, but `names` contains it",
                     remedy=nearest(str(name), self._known, kind="quantities"),
                 )
 

@@ -35,7 +35,7 @@ def add_to(commands: Any) -> None:
     parser.add_argument(
         "--flat",
         action="store_true",
-        help="print the model as one TOML file, in which the parts ([use.NAME]) are written out",
+        help="print the model as one TOML file, with the content of the parts ([use.NAME]) included",
     )
     parser.add_argument(
         "--units",

@@ -84,7 +84,7 @@ def execute(args: argparse.Namespace, session: Session) -> int:
     record = found.to_dict(args.harmonics)
     try:  # write files first: printing fails if the reader of the pipe has gone
         if args.plot and found.kind == "equilibrium":
-            complain(f"nothing varies in an equilibrium: {args.plot} is not written")
+            complain(f"an equilibrium does not vary over time, so {args.plot} is not written")
         elif args.plot:
             from hybridsim.plot import save, time_history
 

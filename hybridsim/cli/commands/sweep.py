@@ -55,7 +55,7 @@ def add_to(commands: Any) -> None:
         metavar="NAME=VALUES",
         nargs="+",
         type=values.assignment,
-        help="a parameter, or a state for its initial value, with the values to use",
+        help="a parameter or state with its values; a state is varied in its initial value",
     )
     options.add(
         parser,
@@ -70,7 +70,7 @@ def add_to(commands: Any) -> None:
     parser.add_argument(
         "--list",
         action="store_true",
-        help="take the k-th values of all parameters together, instead of all combinations",
+        help="combine the k-th values of all parameters, instead of all combinations",
     )
     options.add(parser, "--t-end", "TIME", "end time of each run, for measures of runs")
     options.add(
@@ -122,8 +122,8 @@ def execute(args: argparse.Namespace, session: Session) -> int:
         settings["t_span"] = (0.0, _end_of_all(model, args.t_end, axes))
         if args.after is not None:
             raise UsageError(
-                "--after cannot be combined with measures of runs",
-                remedy="remove --after or measure a period",
+                "--after cannot be combined with measures of a whole run",
+                remedy="remove --after, or choose measures of one period",
             )
     elif args.t_end is not None:
         raise UsageError("--t-end requires measures of runs", remedy="remove --t-end or add --measure final")
@@ -133,7 +133,7 @@ def execute(args: argparse.Namespace, session: Session) -> int:
     if args.processes is not None and args.workers is not None:
         raise UsageError(
             "--processes cannot be combined with --workers",
-            remedy="remove --workers: it is the number of threads",
+            remedy="remove --workers, which sets the number of threads",
         )
 
     is_new = not folder.exists()
@@ -189,7 +189,8 @@ def _fill(
         return session.interrupted_code
     if is_lost:
         complain(
-            "a worker ended, for example for lack of memory: the same command runs the lost points again"
+            "a worker process ended unexpectedly, for example because memory was exhausted; run the same command "
+            "again to compute the missing points"
         )
     return SimulationError.exit_code if is_lost or result.failed.all() else 0
 

@@ -43,8 +43,8 @@ def require_dissipation(
         if automaton.is_unilateral:
             if effect <= 0.0:
                 raise ModelError(
-                    f"impact {automaton.name}: the force {automaton.name} closes its gap instead of opening it "
-                    f"(its effect on the second derivative of the gap is {effect:.6g} and must be positive)",
+                    f"impact {automaton.name}: the force {automaton.name} closes the gap instead of opening it (the "
+                    f"effect of the force on the second derivative of the gap is {effect:.6g}, but must be positive)",
                     place=system.model.all_components()[c].place,
                     remedy=f"reverse the sign of {automaton.name} in the rates, or the sign of the gap",
                 )

@@ -49,8 +49,9 @@ def refuse_changed_rates(lowering: LoweringState, surfaces: dict[int, Any]) -> N
             state = lowering.model.states[i]
             if state.name in changing:
                 raise ModelError(
-                    f"modes of {changing[state.name].name} change the derivative of {state.name}, on which the rate "
-                    f"of the {lowering.title(c)} '{lowering.written(c)}' of {lowering.components[c].name} depends",
+                    f"the rate of the {lowering.title(c)} '{lowering.written(c)}' of {lowering.components[c].name} "
+                    f"depends on {state.name}, but modes of {changing[state.name].name} change the derivative of "
+                    f"{state.name}",
                     place=changing[state.name].place,
                     remedy=f'set a variable in the modes, set = {{ w = "..." }}, and use it in the derivative of '
                     f"{state.name}",

@@ -303,8 +303,8 @@ def find_roots(
         subdivisions += 1
         if subdivisions > _MAX_SUBDIVISIONS:
             raise StepFailure(
-                f"the zeros in one step could not be separated with {subdivisions} subintervals: reduce max_step, or "
-                "write the function without poles, so that it is defined on both sides of each zero"
+                f"the zeros within one step could not be separated with {subdivisions} subintervals; reduce "
+                "max_step, or write the function without poles"
             )
         coefficients = np.empty(DEGREE + 1)
         error, largest = _represent(samples, coefficients)

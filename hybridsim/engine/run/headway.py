@@ -122,8 +122,8 @@ class Headway:
         if self._fades(now, spent, left) or is_hopeless:
             advice = _JUMP if crawls else _EVENTS if has_events else _STEPS
             raise NoHeadway(
-                f"no progress: the last interval led from t = {float(before):.9g} to {float(now):.9g}, and the rest of "
-                f"the run would take at least {to_go / spent:.0e} times as much work as this interval",
+                f"no progress: the last interval advanced only from t = {float(before):.9g} to {float(now):.9g}, "
+                f"and the rest of the run would need at least {to_go / spent:.0e} times the work of this interval",
                 advice,
             )
 

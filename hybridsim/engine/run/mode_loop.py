@@ -261,7 +261,7 @@ class ModeLoop:
         """Restore a checkpoint, and return the first step size."""
         arrays = checkpoint.arrays
         if "step_size" not in arrays:  # from a method with fixed steps
-            raise damaged("the checkpoint")
+            raise damaged("the checkpoint, which has no step size")
         self.origin = self.adopted = checkpoint.instant
         if checkpoint.settled is not None:
             self.timetable.mark_done(checkpoint.settled)
@@ -362,7 +362,7 @@ class ModeLoop:
         for k in sorted(run.undefined):
             name = self.system.monitor_names[k]
             record.warn(
-                f"monitor {name} is not a number during a part of the run: its crossings there are not detected"
+                f"monitor {name} is not a number during a part of the run; its zeros there are not detected"
             )
 
     # -- events ---------------------------------------------------------------------------------------------

@@ -107,6 +107,7 @@ def _grazing(
     mode = automaton.modes[number]
     name = automaton.guard_names[number][automaton.guards[number].index(guard)]
     record.warn(
-        f"near-grazing: guard {name} of {automaton.name} in mode {mode} comes within rounding of zero"
+        f"near-grazing: guard {name} of {automaton.name} in mode {mode} comes so close to zero that rounding hides "
+        "its sign"
     )
     return Occurrence(origin.plus(s), "near-grazing", automaton.name, name, mode, mode, 0, x, x)

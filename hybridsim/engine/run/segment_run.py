@@ -453,8 +453,8 @@ class SegmentRun:
             # a corner has the same value on both sides, so noise near its zero is harmless
             if not self.system.is_corner[self.system.owner[g]]:
                 raise StepFailure(
-                    f"{self.system.guard_title(g, self.flow.z)} was located as falling, but it rises: events "
-                    f"are closer together than the tolerances of the integrator can resolve"
+                    f"{self.system.guard_title(g, self.flow.z)} was found to fall through zero, but it rises there; "
+                    "the events are too close together for the tolerances of the integrator"
                 )
         stopping = []
         for root in step.roots:

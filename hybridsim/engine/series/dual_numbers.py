@@ -91,7 +91,7 @@ def _parts(other: Any) -> tuple[float, Any]:
 def _held(condition: Any) -> bool:
     """Return whether a condition holds at all values, or raise an error if it holds at some of the values only."""
     if np.ndim(condition) and not (condition.all() or not condition.any()):
-        raise ValueError("a condition holds at some of the values only")
+        raise ValueError("a condition is true for some of the values and false for others")
     return bool(np.all(condition))
 
 

@@ -145,7 +145,7 @@ class CvodeStepper:
 
     def restep(self, step: Step, s: float) -> Step:
         """Raise NotImplementedError; events are located on the dense output, which is as accurate as the method."""
-        raise NotImplementedError("events of CVODE are located on its dense output")
+        raise NotImplementedError("the events of CVODE are located on the dense output")
 
 
 class _Cvode(Integrator):

@@ -91,8 +91,8 @@ class TaylorStepper:
             self.creeping, self.since, self.shortest = 1, self.s, h
         if self.creeping == _CREEPING:
             raise Creeping(
-                f"{_CREEPING} consecutive steps were 100 times shorter than their series allow, and were discarded; "
-                f"the last step was {h:.3g}",
+                f"{_CREEPING} consecutive steps were discarded because they were 100 times shorter than the Taylor "
+                f"series allow; the last step was {h:.3g}",
                 self.since,
             )
         if not h > 0.0:

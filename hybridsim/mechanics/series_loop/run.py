@@ -51,7 +51,8 @@ def _order_in_range(built: Built, span: tuple[float, float]) -> int:
     order = int(_RANGE / max(decades, 1.0))
     if order < _MIN_ORDER:
         raise UsageError(
-            f"rates up to {max(rates):.3g} over a span of {span[1] - span[0]:.3g} exceed the range of numbers",
+            f"the series coefficients overflow for rates up to {max(rates):.3g} and a time span of "
+            f"{span[1] - span[0]:.3g}",
             remedy="choose a unit of time in which the rates are closer to 1",
         )
     return order

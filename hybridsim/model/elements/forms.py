@@ -152,7 +152,8 @@ class _Forms:
             if name in jumping:
                 raise element.error(
                     f"{what} of a backlash depends on '{name}', {jumping[name]}",
-                    "use an input that is continuous and has one rate, or write the backlash as a component with modes",
+                    "use a continuous input whose rate has the same formula in all modes, or write the backlash as "
+                    "a component with modes",
                 )
         constants: tuple[Declared, ...] = (*self.model.parameters, *self.model.discrete)
         return rate_along(element.input, what, self.model.states, self.definitions, constants)

@@ -34,8 +34,9 @@ def refuse_readers(model: Any, parts: Mapping[str, Any], quantizers: Mapping[str
         for name in sorted(seen & quantizers.keys()):
             raise expr.error(
                 f"{what} reads the quantizer '{name}', which may still have an old value at an event",
-                remedy=f"compare its input '{quantizers[name].input.text}' with the borders instead; for a sampled "
-                "value, quantize the output of an element of kind 'delay' with `ticks = 1`",
+                remedy=f"compare the input '{quantizers[name].input.text}' of the quantizer with the borders "
+                "instead; if this input is sampled, quantize the output of a 'delay' element with `ticks = "
+                "1`",
             )
 
 

@@ -100,7 +100,9 @@ class IndexedExpression:
             return value_of(node, values)
         except NoValue as fault:
             message = f"'{write(node)}' has no value for i = {values.get(INDEX, math.nan):g}: {fault.reason}"
-            raise self._fail(message, 0, "use sums and products of i and whole numbers") from None
+            raise self._fail(
+                message, 0, "write the index with the letter i, whole numbers, sums and products"
+            ) from None
 
     def _fail(self, message: str, column: int, remedy: str) -> ExpressionError:
         return ExpressionError(message, place=(self.place or Place()).at(self.text, column), remedy=remedy)

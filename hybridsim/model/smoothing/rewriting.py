@@ -208,7 +208,7 @@ class Rewriting(RewritingState):
             return self._implied(node, above, here)
         owner = self._owner(family)
         if owner is not None:
-            self.note(node, MODE, f"the modes of {self.components[owner].name} determine the side", here)
+            self.note(node, MODE, f"the mode of {self.components[owner].name} selects the branch", here)
             sides = [self.walk(part, here) for part in (below, on_border, above)]
             values = tuple(sides[signs[family] * sign + 1] for signs in self.signs[owner])
             return self._variable(self.implied.setdefault(owner, {}), values)
@@ -227,7 +227,7 @@ class Rewriting(RewritingState):
         pair = self._pair(above, below, family, sign, here)
         if family in self.shared:
             jump = self._jump_at(family, argument, sign)
-            self.note(node, MODE, f"the modes of {jump.name} determine the side", here)
+            self.note(node, MODE, f"the mode of {jump.name} selects the branch", here)
             row = (*(pair if sign == jump.sign else pair[::-1]), self.walk(on_border, here))
             return self._variable(jump.values, row)
         found = self.corners.get(family)
@@ -396,7 +396,7 @@ class Rewriting(RewritingState):
         return ast.Name(name, ast.Load())
 
     def _implied(self, node: ast.expr, side: ast.expr, here: Here) -> ast.expr:
-        self.note(node, MODE, "the known signs determine the side", here)
+        self.note(node, MODE, "the branch follows from signs that are already known", here)
         self.count += 1
         return self.walk(side, here)
 

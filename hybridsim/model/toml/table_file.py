@@ -109,7 +109,7 @@ def column_names(path: Path) -> list[str]:
     if not head or any(map(_is_number, head)):
         place = Place(str(path), rows[0][0] if rows else 1)
         raise ModelError(
-            "the first line has no names of columns", place=place, remedy="write a first line such as t,x,v"
+            "the first line has no column names", place=place, remedy="write a first line such as t,x,v"
         )
     return head
 
@@ -140,7 +140,7 @@ def _refuse_decimal_commas(rows: list[tuple[int, list[str]]], names: list[str] |
         raise ModelError(
             what,
             place=Place(str(path), rows[0][0]),
-            remedy=f"{remedy}; if the numbers are whole, write the names of the columns in the first line",
+            remedy=f"{remedy}; if these are whole numbers, write the names of the columns in the first line",
         )
 
 

@@ -132,7 +132,7 @@ class _Reader:
             elif self._take("*", "·") or not divided:
                 found *= self._power()
             else:
-                raise _NotAUnit("a product after a quotient")
+                raise _NotAUnit("a product follows a quotient without parentheses")
         return found
 
     def _power(self) -> Unit:

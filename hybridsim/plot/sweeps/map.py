@@ -43,7 +43,8 @@ def sweep_map(result: Sweep, *names: str, axes: tuple[Axes, ...] | None = None) 
     """
     if len(result.axes) != 2 or result.mode != "grid":
         raise UsageError(
-            f"a map needs a grid of two parameters, but this sweep is a {result.mode} of {len(result.axes)}",
+            f"a map needs a grid of two parameters, but this sweep is a {result.mode} of {len(result.axes)} "
+            "parameters",
             remedy="draw lines, or select a part of the sweep with to_xarray().sel(...)",
         )
     found = chosen_names(result, names, arrays=False)

@@ -53,7 +53,7 @@ class Sides:
                 return modes
             modes = tuple(after)
         raise UsageError(
-            f"at t = {float(point.t)!r} the expressions with corners change their sides without end, which the "
+            f"at t = {float(point.t)!r} the non-smooth expressions change sides without end, which the "
             "multiple-precision run does not support",
             remedy="use reference='runs'",
         )

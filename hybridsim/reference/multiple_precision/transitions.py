@@ -62,8 +62,8 @@ class Transitions:
             )
             if choice is None:
                 raise SimulationError(
-                    f"at t = {float(point.t)!r} guard {guard.name} of {component.name} would be negative and none of "
-                    "the conditions of its choices holds"
+                    f"at t = {float(point.t)!r} guard {guard.name} of {component.name} becomes negative, but no "
+                    "condition of its choices is true"
                 )
             way, known = (choice.to, choice.reset), ways.setdefault(c, [])
             if known and not is_located:
@@ -106,6 +106,8 @@ class Transitions:
                     )
         for name, amounts in added.items():
             if name in values:
-                raise SimulationError(f"resets at t = {float(point.t)!r} both set {name} and add to it")
+                raise SimulationError(
+                    f"at t = {float(point.t)!r} one reset sets {name} and another reset adds to it"
+                )
             values[name] = context.fsum([before[name], *amounts])
         return values

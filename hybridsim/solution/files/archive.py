@@ -165,7 +165,7 @@ def _read(file: IO[bytes], name: str) -> Solution:
         seal = arrays.pop(_SEAL, np.zeros(0)).tobytes().decode()
         header = json.loads(text)
         if not isinstance(header, dict) or header.get("format") != FORMAT:
-            raise ValueError("the header has another format")
+            raise ValueError("the header does not have the format of a saved solution")
     except (ValueError, RecursionError) as error:
         raise UsageError(f"{name} is not a saved solution: {error}", remedy=_REMEDY) from error
     if header.get("version") != VERSION:

@@ -104,12 +104,12 @@ def check_header(header: Header) -> None:
         check_number("the time at which another integrator took over", taken_over[1])
     kinds = header["kinds"]
     if not (isinstance(kinds, list) and all(isinstance(kind, str) for kind in kinds)):
-        raise ValueError("the kinds of blocks are not strings")
+        raise ValueError("a kind of block is not a string")
     if header["save"] not in ("all", "events", "last-period", "nothing"):
         check_number("the save setting", header["save"], 0.0)
     retention = header["keep"]
     if not (isinstance(retention, list) and len(retention) == 2):
-        raise ValueError("the retention is not a pair")
+        raise ValueError("the `keep` setting is not a pair")
     for value in retention:
         if value is not None:
             check_number("a part of the retention", value, 0.0, is_finite=False)
@@ -197,7 +197,7 @@ def check_checkpoint(header: Header, arrays: Arrays, system: System, span: tuple
                 np.isnan(arrays["headway"]).any()
                 or np.isinf(np.delete(arrays["headway"], HEADWAY_PACE)).any()
             ):
-                raise ValueError("a measured speed of the run in the checkpoint is not finite")
+                raise ValueError("a speed measured during the run is not finite in the checkpoint")
         if "taken_over" in arrays:
             check_forms("the checkpoint", arrays, {"taken_over": (float, ())}, {})
             check_finite("the time of a change of method", arrays["taken_over"])

@@ -75,7 +75,9 @@ def _check_members(members: list[zipfile.ZipInfo], size: int) -> None:
     for member in members:
         is_plain = member.compress_type == zipfile.ZIP_STORED and member.file_size == member.compress_size
         if not is_plain or member.flag_bits & ~_NAMES_IN_UTF8:
-            raise ValueError(f"the array '{member.filename}' is compressed, encrypted or of another kind")
+            raise ValueError(
+                f"the array '{member.filename}' is compressed or encrypted, or has unsupported zip flags"
+            )
     if sum(member.file_size for member in members) > size:
         raise ValueError("the arrays are larger than the file")
 

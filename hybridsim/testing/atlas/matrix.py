@@ -128,7 +128,8 @@ def atlas(
     own = [one for one in integrators or () if not isinstance(one, str)]
     if len(own) > 1 or (own and len(integrators or ()) > 1):
         raise UsageError(
-            "An integrator class cannot be combined with others", remedy="call atlas() once for each class"
+            "an integrator class cannot be combined with other integrators",
+            remedy="call atlas() once for each class",
         )
     if own:
         with registered(own[0]) as name:

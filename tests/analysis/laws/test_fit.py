@@ -93,7 +93,7 @@ def test_a_run_with_a_fitted_law() -> None:
         ([0, 1, np.nan], [1, 2, 3], 2, "not finite"),
         ([0, 1, 2], [1, 2, np.inf], 2, "not finite"),
         ([0, 1, 1], [1, 2, 3], 3, "`knots` cannot be 3"),
-        ([1, 1], [1, 2], 2, "`at` has no two different numbers"),
+        ([1, 1], [1, 2], 2, "`at` contains fewer than two different numbers"),
         ([0, 1, 2], [1, 2, 3], 1, "`knots` cannot be 1"),
         ([0, 1, 2], [1, 2, 3], 2.5, "`knots` cannot be 2.5"),
         (["a", 1, 2], [1, 2, 3], 2, "a value of `at` cannot be 'a'"),

@@ -189,7 +189,7 @@ def test_periods_that_no_longer_fit_are_refused() -> None:
         states=[hs.State("x", 0, "sin(w*t) + cos(u*t) - x", nominal=1)],
     )
     steady = hs.steady_state(model)
-    with pytest.raises(hs.UsageError, match="a change of u changes the periods of the forcing by different"):
+    with pytest.raises(hs.UsageError, match="a change of u changes the forcing periods by different"):
         steady.sensitivities(["u"])
     tied = hs.steady_state(model.with_(u="2*w"))
     assert tied.sensitivities(["w"]).period_by_parameter == pytest.approx([-2 * np.pi], rel=EXACT)
@@ -224,7 +224,7 @@ def test_motions_and_names_without_derivatives_are_refused() -> None:
     steady = hs.steady_state(forced())
     with pytest.raises(hs.UsageError, match="no parameter 'f'"):
         steady.sensitivities(["f"])
-    with pytest.raises(hs.UsageError, match="cannot contain t"):
+    with pytest.raises(hs.UsageError, match="the time t cannot be measured"):
         steady.sensitivities(["F"]).of("mean", "t", "x")
     plain = hs.Model(
         "plain", parameters={"a": 1.0}, states=[hs.State("x", 0, "a - x + 1e-9*exp(-t)", nominal=1)]

@@ -77,7 +77,7 @@ direction = "up"
 action = "reset"
 reset.x = "x + 1\""""
     declared = model('x = { start = 0, der = "1" }\ny = { start = 0, der = "x" }', "a = 1\nc = 3", rest)
-    with pytest.raises(UsageError, match="happen at different times"):
+    with pytest.raises(UsageError, match="separate after a small change"):
         hs.sensitivities(hs.simulate(declared, (0.0, 1.5)), ["a"])
 
 

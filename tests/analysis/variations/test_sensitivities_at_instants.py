@@ -156,7 +156,7 @@ modes.high.guards.never = { expr = "9 - y", then = "low" }
 """
     )
     states = 'v = { start = 0, der = "u - f" }\ny = { start = 0, der = "1" }'
-    with pytest.raises(UsageError, match="happen at different times"):
+    with pytest.raises(UsageError, match="separate after a small change"):
         hs.sensitivities(ran(model(states, rest, "mu = 0.3\na = 1"), 2.0), ["a"])
 
 

@@ -95,7 +95,7 @@ def test_the_release_of_a_block_by_a_table() -> None:
 def test_values_that_are_not_there_are_refused() -> None:
     """An index beyond the table, and another name."""
     run = hs.simulate(driven("linear"), (0, 3))
-    with pytest.raises(hs.UsageError, match=r"u has 4 values, but no value u\[4\]"):
+    with pytest.raises(hs.UsageError, match=r"u has only 4 values, so u\[4\] does not exist"):
         hs.sensitivities(run, ["u[4]"])
     with pytest.raises(hs.UsageError, match=r"no parameter 'w\[0\]'"):
         hs.sensitivities(run, ["w[0]"])

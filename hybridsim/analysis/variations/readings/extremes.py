@@ -57,7 +57,7 @@ class Extremes:
         self._series = orbit.of(name) @ TO_COEFFICIENTS.T
         if not np.isfinite(orbit.of(name)[inside]).all():
             raise UsageError(
-                f"{name} is not finite at some times, so it has no readings",
+                f"{name} is not finite at some times, so it cannot be measured",
                 remedy=f"use a part of the run, t_span=(a, b), in which {name} is finite",
             )
         self._first, self._last = self.limits = first, last

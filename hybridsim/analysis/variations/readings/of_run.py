@@ -64,7 +64,7 @@ def quantities_of(reading: Any, quantities: Sequence[Any]) -> tuple[str, ...]:
     """Check the number and types of the quantities for a reading such as "maximum", and return their names."""
     if text(reading, "reading") not in READINGS:
         raise UsageError(
-            f"there is no reading {reading!r}", remedy=nearest(reading, READINGS, kind="readings")
+            f"the reading {reading!r} does not exist", remedy=nearest(reading, READINGS, kind="readings")
         )
     names = checked_names(quantities, "quantities")
     most = len(names) if reading in ("integral", "mean") else 1
@@ -154,8 +154,9 @@ class Readings:
             if is_limit and shift.any():
                 by = " and ".join(np.array(self._changes)[shift != 0.0])
                 raise UsageError(
-                    f"{extremes.name} is largest or least at an event at t = {self._time(place):.9g}, an end of the "
-                    f"time span; a change of {by} moves the event, so there is no derivative",
+                    f"{extremes.name} has its extreme value at an event at t = {self._time(place):.9g}, which is an "
+                    f"end of the time span; a change of {by} moves this event, so the extreme value has no "
+                    "derivative",
                     remedy=self._remedy or "use a part of the run that ends earlier or later, t_span=(a, b)",
                 )
             if (place.number, place.s) == extremes.limits[1]:
@@ -214,8 +215,8 @@ class Readings:
             if t in (self._low, self._high):
                 by = " and ".join(np.array(self._changes)[shift != 0.0])
                 raise UsageError(
-                    f"{' * '.join(names)} jumps at t = {t:.9g}, an end of the time span; a change of {by} "
-                    "moves the jump, so the integral has no derivative",
+                    f"{' * '.join(names)} jumps at t = {t:.9g}, which is an end of the time span; a change of {by} "
+                    "moves this jump, so the integral has no derivative",
                     remedy=self._remedy or "use a part of the run that ends earlier or later, t_span=(a, b)",
                 )
             total += jump * shift

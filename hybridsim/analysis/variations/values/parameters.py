@@ -75,7 +75,7 @@ def _derivative(expression: Expression, name: str, values: Mapping[str, float]) 
     value = float(agreed(sides)[0, 0])
     if np.isnan(value):
         raise UsageError(
-            f"{expression.text} has no derivative by {name} at {name} = {values[name]:.6g}",
+            f"{expression.text} has no derivative with respect to {name} at {name} = {values[name]:.6g}",
             remedy=f"do not request derivatives by {name}, or use another value",
         )
     return value

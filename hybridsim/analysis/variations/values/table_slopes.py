@@ -39,7 +39,7 @@ def table_value(model: Model, name: str) -> TableValue | None:
     count = len(model.inputs[number].values)
     if index >= count:
         raise UsageError(
-            f"the input {found[1]} has {count} values, but no value {name}",
+            f"the input {found[1]} has only {count} values, so {name} does not exist",
             remedy=f"use an index from 0 to {count - 1}",
         )
     return TableValue(number, index)

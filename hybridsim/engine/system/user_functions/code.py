@@ -157,7 +157,7 @@ class PythonCode:
                 "derivatives of guards and monitors are finite differences of the Python functions"
             )
         if self.refused:
-            trajectory.warn(f"{self.refusal_message}: they run as uncompiled Python functions")
+            trajectory.warn(f"{self.refusal_message}, so the functions run as uncompiled Python")
         failure = self.last_failure()
         if failure and trajectory.status not in ("finished", "terminated"):
             trajectory.message += f"; {failure}"

@@ -161,7 +161,7 @@ def rates(function: Function, count: int, t: float, x: np.ndarray, p: Any) -> np
     found = _array(returned)
     if found is None or found.shape != (count,):
         raise ModelError(
-            f"the flow {function_name(function)} returned {_shown(returned)}, and the model has {count} states",
+            f"the flow {function_name(function)} must return {count} numbers, but returned {_shown(returned)}",
             remedy=f"return {count} numbers, the rate of each state in order, as a tuple or an array",
         )
     return found
