@@ -308,7 +308,7 @@ def initial_modes(system: System, z0: Any) -> np.ndarray:
 
 
 def retention_of(save: Any, system: System) -> Retention:
-    """Return the parts of the run to store. `save` is the argument `keep`: a word, or a length of time at the end."""
+    """Return the parts of the run to store; `save` is a word, or the length of time before the end of the run."""
     from hybridsim.engine.record.retention import ALL, EVENTS, NOTHING, Retention
 
     retentions = {"all": ALL, "events": EVENTS, "nothing": NOTHING}

@@ -30,7 +30,7 @@ def refusing(function: Callable[Arguments, Result]) -> Callable[Arguments, Resul
 
 
 class Default(str):
-    """The default of an argument: a word that differs by identity from the same word in a call."""
+    """A default value that can be distinguished from an equal text passed by the caller."""
 
 
 def renamed(function: str, options: dict[str, Any], former: str, name: str, value: Any) -> Any:

@@ -169,7 +169,7 @@ def prepared(
 
 
 def _check_functions(method: Integrator, system: System, code: PythonCode, x0: np.ndarray, t0: float) -> None:
-    """Raise an error for Python functions that the method cannot use, or with a wrong result."""
+    """Raise an error if the method cannot use the model's Python functions, or if a function returns a wrong result."""
     reason, remedy = method.lacks.get("functions", ""), "write the model in expressions, or use dop853"
     if code.refused and not method.name.startswith("scipy-"):
         reason, remedy = code.refusal_message, "use scipy-dop853, which calls the functions in Python"

@@ -52,7 +52,7 @@ class Parser(argparse.ArgumentParser):
         super().__init__(allow_abbrev=False, formatter_class=argparse.RawDescriptionHelpFormatter, **settings)
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
-        """Parse the line. This parser reports unknown options itself, because it finds similar names."""
+        """Parse a command line; unknown options are reported with similar names."""
         line = sys.argv[1:] if args is None else list(args)
         known, unknown = super().parse_known_args(_join_negative_values(line), namespace)
         if unknown:

@@ -1,4 +1,4 @@
-"""This module delivers a solution on the command line: summary or JSON, files and exit code."""
+"""This module prints the solution of a command, writes its files and returns the exit code."""
 
 from __future__ import annotations
 

@@ -117,7 +117,7 @@ class Ensemble:
 
     @contextmanager
     def scratch(self, group: Group) -> Iterator[GroupScratch]:
-        """Yield scratch arrays for a group; its kernels enter the tables of each point in the model."""
+        """Yield scratch arrays for a group of runs."""
         spare: deque[Any] = spare_scratch(self.system, "ensemble", group.tables.form)
         try:
             scratch = spare.pop()

@@ -47,7 +47,7 @@ def steady_orbits(
     first_periods: int,
     max_periods: int,
 ) -> Iterator[Orbits]:
-    """Yield, in groups, the steady motions that compiled code can decide; other motions are left out.
+    """Yield groups of steady motions, without those that compiled code cannot decide.
 
     parameters (N, P), in the order of the model; starts (N, n). tol, max_periods: as in `hs.steady_state`.
     first_periods: periods before the first test. The iteration ends early if `may_continue` of the ensemble returns

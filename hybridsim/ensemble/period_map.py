@@ -36,7 +36,7 @@ class MapScratch(NamedTuple):
 
 @kernel
 def run_periods(packs: Any, length: float) -> int:
-    """Run from the state in `packs` and time 0 for whole periods; return the number of segments, or 0.
+    """Run for a whole number of periods from the state in `packs`; return the number of segments, or 0.
 
     0 means that the compiled loop has left an event to the general one. The state begins a segment in its modes.
     """

@@ -23,7 +23,7 @@ BEGIN, SUMMARISE, SEARCH, NEWTON = range(4)  # indices of `LoopPacks.entry_point
 
 
 class LoopPacks(NamedTuple):
-    """The packs of the compiled event loop for one model."""
+    """The arrays of the compiled event loop for one model, packed for kernels."""
 
     model: Any  # `hybridsim.engine.run.event_loop.LoopModel`, whose tables are those of the present point
     call: Any  # `LoopCall`
@@ -132,7 +132,7 @@ def summarise(
 
 @inlined
 def set_start_errors(state: Any) -> None:
-    """Set the error bounds of states that are given as numbers, as `engine.events.start.start_errors` does."""
+    """Set the error bounds of start values from their rounding; whole numbers are exact."""
     for j in range(state.x.shape[0]):
         x = state.x[j]
         state.x_error[j] = 0.0 if x == round(x) else 2.0 * UNIT * abs(x)

@@ -33,7 +33,7 @@ class LastPeriods(NamedTuple):
 def last_periods(
     ensemble: Ensemble, parameters: np.ndarray, starts: np.ndarray, periods: int
 ) -> Iterator[LastPeriods]:
-    """Run all supported points over a number of forcing periods, and yield the last periods, in any order.
+    """Run all supported points over a number of forcing periods, and yield the last periods as they are computed.
 
     parameters (N, P), in the order of the model; starts (N, n). The iteration ends early if `may_continue` of the
     ensemble returns False.

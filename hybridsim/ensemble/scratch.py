@@ -38,7 +38,7 @@ from hybridsim.integrators.closed_form.segments import ClosedFormRows
 
 
 class GroupScratch:
-    """Scratch arrays for runs with tables of equal shapes, and packs of the arrays.
+    """Scratch arrays for all runs of a group, also in packed form for kernels.
 
     Parameters
     ----------

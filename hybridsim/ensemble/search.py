@@ -155,7 +155,7 @@ def search_point(
 
 @inlined
 def _summarise(packs: Any, fixed: Any, segments: int, scratch: Any) -> int:
-    """Summarise the recorded segments; return 0 if one oscillates too often."""
+    """Summarise the recorded segments; return 0 if a segment has too many oscillations."""
     arguments = packs, fixed, packs.record, packs.rows, scratch.found, 0, segments, 0.0
     return call_kernel(packs.entry_points[SUMMARISE], arguments)
 

@@ -59,7 +59,7 @@ class EnsembleTables:
         self.addresses = rows.ctypes.data + np.arange(count) * rows.strides[0]
 
     def first(self) -> Any:
-        """Return a copy of the tables of the first point, with the shapes and the type of the tables of all points."""
+        """Return a copy of the tables of the first point, with array shapes that fit every point."""
         modes, found = self.form[2], {name: getattr(self._tables, name) for name in _FIELDS}
         found |= {name: array[0] for name, array in self._computed.items()}
         return packed(

@@ -24,11 +24,11 @@ else:
             return isinstance(instance, Solution) and isinstance(instance._trajectory, cls.trajectory)
 
     class MechanicalSolution(Solution, metaclass=_Former):
-        """The former name of a `Solution` of a `MechanicalSystem` by ``taylor``."""
+        """The former name of a `Solution` that ``taylor`` returned for a `MechanicalSystem`."""
 
         trajectory = SeriesTrajectory
 
     class SteppedSolution(Solution, metaclass=_Former):
-        """The former name of a `Solution` of a `MechanicalSystem` by ``moreau``."""
+        """The former name of a `Solution` that ``moreau`` returned for a `MechanicalSystem`."""
 
         trajectory = SteppedTrajectory

@@ -122,7 +122,7 @@ def simulate_mechanical(
 
 
 def start_of(system: MechanicalSystem, x0: Any) -> np.ndarray:
-    """Return the initial positions and velocities (2n,): those of the system, as far as `x0` has no others."""
+    """Return the initial positions and velocities (2n,), from `x0` if given there, otherwise from the system."""
     names = (*system.names, *system.velocities)
     start = np.concatenate([system.q0, system.v0])
     if x0 is None:

@@ -92,7 +92,7 @@ class Meanings:
         return frozenset(found), sign
 
     def signs(self, component: Component, mode: Mode) -> Mapping[Family, int]:
-        """Return the known signs in a mode, by family: signs of guards, and 0 for a held surface."""
+        """Return the signs that are known in a mode: the signs of its guards, and 0 for a held surface."""
         surface = component.surface
         known: dict[Family, int] = {}
         for guard in mode.guards:

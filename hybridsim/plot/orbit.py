@@ -123,7 +123,7 @@ def _concerned(solution: Solution, drawn: set[str]) -> list[str]:
 
 
 def _modes_of(modes: Mapping[str, str], concerned: Sequence[str]) -> dict[str, str]:
-    """Return the modes of some components; a contact that is open has no other mode."""
+    """Return the modes of the given components; an open contact has the mode "open" only."""
     return {
         name: "open" if modes.get(f"{name}_N") == "open" else mode
         for name, mode in modes.items()

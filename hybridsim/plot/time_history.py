@@ -192,7 +192,7 @@ def _monitor_handle(solution: Solution, window: Window) -> Line2D:
 
 
 def _marks_in(solution: Solution, window: Window) -> dict[str, np.ndarray]:
-    """Return the times of the events in a window by kind; near-grazings change nothing and are left out."""
+    """Return the event times in a window by kind, without near-grazings."""
     found = {kind: event_times(solution, [kind]) for kind in CUTS}
     return {kind: times[(window.t0 <= times) & (times <= window.t1)] for kind, times in found.items()}
 

@@ -85,7 +85,7 @@ def work_precision(comparison: Comparison, axes: Sequence[Axes] | None = None) -
 
 
 def headline(comparison: Comparison) -> str:
-    """Return the title of a comparison: the model with the result, then the length of the run and the reference."""
+    """Return the title of a comparison, which names the model, the result, the length of the run and the reference."""
     from hybridsim.analysis.compare.table import cheapest
 
     t0, t1 = comparison.t_span

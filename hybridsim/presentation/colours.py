@@ -17,7 +17,7 @@ _RESERVED = {
 
 
 def mode_colours(components: Collection[Component]) -> dict[str, str]:
-    """Return a colour for each mode: by its name, black if it holds a surface, or from the rest of the palette."""
+    """Return a colour for each mode; modes that hold a surface are black, and known names have fixed colours."""
     held = {component.surface.hold for component in components if component.surface}
     return colours_of(dict.fromkeys(mode.name for component in components for mode in component.modes), held)
 

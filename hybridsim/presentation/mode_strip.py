@@ -22,7 +22,7 @@ class Interval(Protocol):
 
 
 class Bar(NamedTuple):
-    """A rectangle of a strip: its times, its lower and upper edge as fractions of the height, and its mode."""
+    """A rectangle of a mode strip: its times, its lower and upper edge as fractions of the height, and its mode."""
 
     start: float
     end: float
@@ -72,7 +72,7 @@ def bars_of(
 
 
 def _heights(times: Sequence[float], least: float) -> list[float]:
-    """Return heights in proportion to times, with the sum 1; none is below a least height if there is room."""
+    """Return heights that are proportional to times and sum to 1; small heights are raised to a minimum if possible."""
     least = min(least, 1 / len(times))
     small = {i for i, time in enumerate(times) if time <= least * sum(times)}
     while True:

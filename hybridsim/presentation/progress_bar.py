@@ -15,7 +15,7 @@ _WIDTH = 79  # characters of the line
 
 
 class ProgressLine:
-    """One line on stderr that is written again and again, first after a number of seconds."""
+    """A line on stderr that is overwritten regularly after an initial delay."""
 
     def __init__(self, wait: float) -> None:
         self.wait, self.began = wait, time.monotonic()
@@ -23,7 +23,7 @@ class ProgressLine:
         self.shown = 0  # characters of the open line
 
     def is_due(self) -> bool:
-        """Return whether it is time to write the line again."""
+        """Return whether the progress line is due to be updated."""
         return time.monotonic() >= self._next
 
     def write(self, text: str) -> None:

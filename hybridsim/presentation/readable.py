@@ -30,7 +30,7 @@ def in_numbers(values: Iterable[complex]) -> str:
 
 
 def cost_text(stats: Mapping[str, Any]) -> str:
-    """Return the cost of a run; a closed form evaluates no right-hand sides, and rejects no steps."""
+    """Return the cost of a run, without evaluations and rejected steps for a closed form."""
     rejected = f" ({stats['rejected']} rejected)" if stats["rejected"] else ""
     parts = [f"{stats['steps']} steps{rejected}"]
     if stats["rhs_evaluations"]:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 class EventLike(Protocol):
-    """The fields of an event that a comparison reads, as in `hybridsim.Event`."""
+    """The fields of `hybridsim.Event` that a comparison reads."""
 
     @property
     def t(self) -> float: ...

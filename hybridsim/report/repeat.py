@@ -41,7 +41,7 @@ class Settings:
         }
 
     def _compare(self, model: Model) -> bool:
-        """Return whether the model is a packaged model with other values, and store the other parameters."""
+        """Return whether the model differs from a packaged model in values only, and store the changed values."""
         if self.text is None or model.name not in {info.name for info in list_models()}:
             return False
         packaged = load(model.name)

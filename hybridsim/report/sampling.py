@@ -92,7 +92,7 @@ class Sampler:
         return every[order], np.concatenate(values, axis=1)[:, order]
 
     def _deviates(self, at_a: Array, at_middle: Array, at_b: Array) -> NDArray[np.bool_]:
-        """Return which parts are not straight within the accuracy of the page."""
+        """Return a mask of the parts on which the curve deviates visibly from a straight line."""
         with np.errstate(all="ignore"):
             deviation = np.abs(at_middle - 0.5 * (at_a + at_b)) / self._sizes[:, None]
         return np.asarray((deviation > _DEVIATION).any(axis=0))

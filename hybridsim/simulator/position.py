@@ -110,13 +110,13 @@ def begun(run: Run, commit: Callable[[Position], None]) -> None:
 
 
 def stepped(run: Run) -> Run:
-    """Return a prepared run for single steps, which stores events; states are stored only if needed to find poles."""
+    """Return a prepared run for single steps; the run stores events, and states only if poles are possible."""
     retention = ALL if denominators(run.model) else EVENTS
     return replace(run, task=replace(run.task, is_stepped=True, retention=retention))
 
 
 def advanced(position: Position, to: float, commit: Callable[[Position], None]) -> None:
-    """Pass the position at a later time to `commit`; after an error, the position at the last event."""
+    """Advance to a later time and pass the position to `commit`; if a step fails, pass that of the last event."""
     run, step = position.run, position.point.step(Instant(to))
     if isinstance(step, ResumePoint):
         commit(Position(run, step, position.warnings, position.events))

@@ -108,7 +108,7 @@ def taken_apart(blocks: Iterable[Any]) -> Iterator[tuple[str, Arrays]]:
 
 
 def put_together(system: System, stored: Iterable[tuple[str, Arrays]]) -> list[Any]:
-    """Restore the blocks of segments from the arrays that `taken_apart` yielded.
+    """Restore the blocks of segments from the arrays of a file.
 
     Raises
     ------

@@ -42,7 +42,7 @@ class ModelEvents:
 
     @cached_property
     def events(self) -> tuple[Event, ...]:
-        """Return all events except changes of side at corners."""
+        """Return all events except changes of sign in corners such as abs."""
         return tuple(Event(float(o.instant), *o[1:]) for o in self.occurrences if o.kind != "corner")
 
     @cached_property
@@ -52,7 +52,7 @@ class ModelEvents:
 
     @cached_property
     def instants(self) -> np.ndarray:
-        """Return the different times of all events, including corners, and of both ends of the run."""
+        """Return the distinct times of all events, including corners, and of both ends of the run."""
         times = [block.times for block in self.record.occurrences.blocks]
         return np.unique(np.concatenate([[self.t_start, self.t_end], *times]))
 

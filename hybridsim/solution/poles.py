@@ -94,7 +94,7 @@ class _Way:
 
 
 def end_at_pole(system: System, trajectory: Trajectory) -> None:
-    """End a run at a zero of a denominator, if the rates are not continuous at this zero."""
+    """End a run at a zero of a denominator, unless the rates are continuous there."""
     every = denominators(system.model)
     if not every or not trajectory.segments or system.n == 0:
         return

@@ -213,22 +213,22 @@ class Solution(InPictures):
 
     @property
     def sol(self) -> Solution:
-        """The dense output, under its name in SciPy."""
+        """The dense output, with the name that SciPy uses."""
         return self
 
     @property
     def nfev(self) -> int:
-        """Number of evaluations of the right-hand side, under its name in SciPy."""
+        """Number of evaluations of the right-hand side, with the name that SciPy uses."""
         return self._measured("nfev", self.stats.get("rhs_evaluations"), "a Model")
 
     @property
     def t_events(self) -> list[np.ndarray]:
-        """Times of each monitor in the order of declaration, under their name in SciPy."""
+        """Times of each monitor in the order of declaration, with the name that SciPy uses."""
         return [self.event_times(name, "monitor") for name in self._monitors]
 
     @property
     def y_events(self) -> list[np.ndarray]:
-        """States (events, n) of each monitor, under their name in SciPy."""
+        """States (events, n) of each monitor, with the name that SciPy uses."""
         found = [
             [e.x_minus for e in self.events if e.component == name and e.kind == "monitor"]
             for name in self._monitors

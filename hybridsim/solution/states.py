@@ -34,7 +34,7 @@ class States:
 
     @cached_property
     def t(self) -> np.ndarray:
-        """Times (m,): the requested grid, or the steps with every event time twice."""
+        """Times (m,): the requested times, or the step times, in which every event time occurs twice."""
         if self._grid is None:
             return self._trajectory.own_times
         if not self._trajectory.has_states:

@@ -71,7 +71,9 @@ tables.mu = { at = [0, 1, 3, 5], values = [0.5, 0.4, 0.3, 0.28] }
 def test_an_equilibrium_has_a_sentence_instead_of_a_picture(tmp_path: Path, hybridsim: Callable) -> None:
     """The ball at rest stays where it is put: no disturbance decays."""
     code, out, err = hybridsim("steady", "bouncing-ball", "--plot", tmp_path / "ball.png")
-    assert code == 0 and "an equilibrium does not vary over time" in err and not (tmp_path / "ball.png").exists()
+    assert (
+        code == 0 and "an equilibrium does not vary over time" in err and not (tmp_path / "ball.png").exists()
+    )
     assert "stable       neutrally: some disturbances neither grow nor decay" in out
 
 

@@ -66,7 +66,9 @@ def test_points_of_a_killed_process_run_again(
         code, out, err = hybridsim(*argv)
     assert code == 1
     assert "1 of 3 points: ok" in out
-    assert "2 of 3 points: the executor lost the batch" in err and "same command again to compute the missing points" in err
+    assert (
+        "2 of 3 points: the executor lost the batch" in err and "again to compute the missing points" in err
+    )
     assert (tmp_path / "o" / "sweep.journal").exists()
     code, out, err = hybridsim(*argv)
     assert code == 0 and "3 of 3 points: ok" in out and "continuing from" in err

@@ -129,7 +129,7 @@ def _suite(args: argparse.Namespace, folder: Path, session: Session) -> int:
 
 
 def _settings(args: argparse.Namespace) -> dict[str, Any]:
-    """Return the arguments that a comparison of one model and the suite have in common."""
+    """Return the arguments that are common to comparisons of one model and of the suite."""
     budget = {} if args.budget is None else {"budget": args.budget}
     return {"rtols": args.rtol, **fields_of(args, "integrators", "steps", "repeat"), **budget}
 

@@ -33,7 +33,7 @@ _SLIP, _BESIDE, _FORWARD, _BASE, _MOBILITY, _HOLDING, _STILL, _DIAGONALS = range
 
 @kernel
 def gather_neighbours(arrays: Any, state: Any, scratch: Any, count: int, tau: float, top: int) -> bool:
-    """Store the values of the patch at time tau if its nodes are consecutive; return whether values were stored."""
+    """Copy the state of the patch at time tau if its nodes are consecutive; return whether they are."""
     first, last = scratch.nodes[0], scratch.nodes[0]
     for i in range(count):
         first, last = min(first, scratch.nodes[i]), max(last, scratch.nodes[i])
@@ -60,7 +60,7 @@ def gather_neighbours(arrays: Any, state: Any, scratch: Any, count: int, tau: fl
 
 @kernel
 def clear_beside(arrays: Any, scratch: Any, count: int, top: int) -> None:
-    """Write zeros on both sides of the values of consecutive nodes, as far as the coupling reaches."""
+    """Write zeros next to the values of consecutive nodes, as far as the coupling reaches."""
     wide, offsets = scratch.Q.shape[1], arrays.offsets
     before, after = -min(offsets[0], 0), max(offsets[-1], WIDTH)  # including padding of the last vector
     for k in range(top + 1):

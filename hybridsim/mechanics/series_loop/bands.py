@@ -20,7 +20,7 @@ _FULL = 1 / 3  # least fraction of non-zero entries in the diagonals
 def in_bands(
     K: Any, C: Any, B: Any, W: Any, single: bool, base: np.ndarray, still: np.ndarray, par: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the offsets of the diagonals, and an array of rows: constants of nodes and laws, then diagonals.
+    """Return the offsets of the diagonals of banded matrices, and the constants of nodes, law and diagonals.
 
     There are no offsets if the system is not of this kind. single: each coordinate is a node with one
     contact, nothing depends on time, and there is one law.

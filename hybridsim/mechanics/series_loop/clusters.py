@@ -113,7 +113,7 @@ def pseudo_inverse(G: Any, m: int, order: Any, size: int, L: Any, P: Any) -> int
 
 @kernel
 def _from_factor(L: Any, size: int, rank: int, P: Any) -> None:
-    """Set P = L (L^T L)^-2 L^T, with L in the first `rank` columns; later columns are scratch."""
+    """Set P = L (L^T L)^-2 L^T, where L is in the first `rank` columns; the other columns of L are overwritten."""
     # Compute S = L^T L = R R^T in the upper-left of P.
     for a in range(rank):
         for b in range(a + 1):

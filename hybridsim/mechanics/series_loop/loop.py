@@ -126,7 +126,7 @@ def _changes_outside(
     top: int,
     rtol: float,
 ) -> float:
-    """Return how much the new series of the outermost nodes change other nodes over h, relative to the tolerance."""
+    """Return the relative change of other nodes over time h if the outermost nodes of a patch get their new series."""
     worst = 0.0
     for i in range(outer, count):
         j = scratch.nodes[i]
@@ -162,7 +162,7 @@ def _changes_outside(
 def _restart(
     arrays: Any, laws: Any, state: Any, scratch: Any, record: Any, control: Any, j: int, tau: float
 ) -> int:
-    """Restart a patch around node j at tau; return 1, or 0 for a patch that is too large, or -1 without a series."""
+    """Restart a patch around node j at tau; return 1 for success, 0 for a patch that is too large, -1 for no series."""
     rtol, _, top, is_recorded, _ = control
     nodes = arrays.node_dof.shape[0] - 1
     left = state.clock[2] - tau
@@ -243,7 +243,7 @@ def _end_step(arrays: Any, state: Any, scratch: Any, tau: float) -> None:
 
 @kernel
 def run(arrays: Any, laws: Any, state: Any, scratch: Any, record: Any, control: Any, target: Any) -> int:
-    """Continue up to a time (high, low), or until no combination of modes is admissible.
+    """Advance the run to a time, which is the sum of two doubles, or until no combination of modes is admissible.
 
     It returns FULL if the record is full, or after the largest number of steps and events of one call.
     """

@@ -59,7 +59,7 @@ def _order_in_range(built: Built, span: tuple[float, float]) -> int:
 
 
 class MechanicalRun:
-    """One run of a mechanical system, which the method `go` carries out, or `begin` and `advance` in parts."""
+    """One run of a mechanical system; `go` runs it as a whole, and `begin` and `advance` run it in parts."""
 
     def __init__(self, built: Built, span: tuple[float, float], x: np.ndarray, rtol: float, atol: np.ndarray,
                  max_step: float, is_recorded: bool, limits: Limits = UNLIMITED) -> None:  # fmt: skip

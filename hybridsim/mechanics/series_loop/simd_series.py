@@ -18,14 +18,14 @@ from hybridsim.engine.series.optimise import PAIRED
 
 @inlined
 def clear(V: Any, at: int, length: int) -> None:
-    """Write zeros from a given position to the end, in whole vectors."""
+    """Write zeros into vectors from index `at` on."""
     for i in range(at, at + length, WIDTH):
         store(V, i, splat(0.0))
 
 
 @inlined
 def lane_place(at: int, block: int, register: int, orders: int, k: int, lane: int) -> int:
-    """Return the index of Taylor coefficient k of a register, for one lane of the vectors."""
+    """Return the index of Taylor coefficient k of a register for one contact."""
     return at + (lane >> 3) * block + (register * orders + k) * WIDTH + (lane & 7)
 
 
@@ -127,7 +127,7 @@ def _with_constant(op: int, x: Any, c: Any) -> Any:
 def advance_simd_series(
     rows: Any, first: int, last: int, V: Any, begin: int, end: int, block: int, orders: int, k: int
 ) -> None:
-    """Compute coefficient k of the operations first..last - 1 for all contacts from `begin` to `end` in V.
+    """Compute coefficient k for all contacts in V[begin:end] by the operations first..last - 1.
 
     Coefficient k of register r is at (r*orders + k)*WIDTH of a block.
     """

@@ -245,7 +245,7 @@ def isolate(
 
 @kernel
 def _at_ends(scratch: Any, nc: int, h: float, top: int) -> None:
-    """Compute relative velocities and forces at the end of the series or at the exits, with error scales."""
+    """Compute relative velocities, forces and error scales at the end of the step, or at an earlier change of mode."""
     R, F, sums = scratch.R, scratch.F, scratch.sums
     wide = R.shape[1]
     for i in range(whole_vectors(nc)):
@@ -269,7 +269,7 @@ def _at_ends(scratch: Any, nc: int, h: float, top: int) -> None:
 def _law_holds(
     arrays: Any, laws: Any, state: Any, scratch: Any, nc: int, h: float, top: int, rtol: float
 ) -> bool:
-    """Return whether slip forces agree with their laws at the end of the series, or at the exits."""
+    """Return whether slip forces agree with their laws at the end of the step, or at an earlier change of mode."""
     _at_ends(scratch, nc, h, top)
     if state.whole[codes.FIRST] >= 0:
         share = _DEFECT * rtol + 64.0 * _UNIT

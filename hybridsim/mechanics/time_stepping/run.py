@@ -132,7 +132,7 @@ class SteppedRun:
 
 
 def _length(system: MechanicalSystem, method: Moreau) -> float:
-    """Return the step that was passed, or a fraction of the period of forcing and bases."""
+    """Return the given step size, or else a fraction of the forcing period."""
     for label in ("step", "period", "steps_per_period"):
         value = getattr(method, label)
         if value is not None and not (math.isfinite(value) and value > 0.0):

@@ -26,7 +26,7 @@ def starting_facts(model: Model) -> tuple[str, ...]:
 
 
 def _starts(model: Model, component: Component, meanings: Meanings) -> Iterator[str]:
-    """Yield sentences on a component if one of its guards or its surface is zero at the start."""
+    """Yield sentences about a component if one of its guards or its surface is zero at the start."""
     name, surface = component.name, component.surface
     if isinstance(component, Corner):
         return
@@ -89,7 +89,7 @@ def _is_zero_at_start(model: Model, expr: Expression, meanings: Meanings) -> boo
 
 
 def _loads(model: Model, meanings: Meanings) -> Iterator[str]:
-    """Yield sentences on normal loads that can reach zero."""
+    """Yield sentences about normal loads that can reach zero."""
     numbers = model.parameter_values()
     for contact in model.contacts:
         tree = meanings.written_out(contact.normal.tree)

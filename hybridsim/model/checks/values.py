@@ -55,7 +55,7 @@ def check_values(findings: Findings) -> None:
 
 
 def _carry_out(findings: Findings, checks: Iterable[_Check] | None) -> None:
-    """Carry out some checks, or all checks."""
+    """Carry out the given checks, or all checks of the model."""
     try:
         values = findings.model.parameter_values()
     except ModelError as fault:
@@ -232,7 +232,7 @@ def _onset(findings: Findings, contact: Contact, values: dict[str, float], backw
 
 
 def _slip_at_points(findings: Findings, contact: Contact, values: dict[str, float], backward: bool) -> None:
-    """Check that the slip force is not negative at the points of tables, in one direction of slip."""
+    """Check that the slip force in one direction is not negative at the points of its tables."""
     if backward and contact.law.slip_backward is None:
         return
     for speed, (across, rows) in product(_speeds_of_tables(contact), _columns_of_tables(contact)):
@@ -245,7 +245,7 @@ def _slip_at_points(findings: Findings, contact: Contact, values: dict[str, floa
 
 
 def _columns_of_tables(contact: Contact) -> list[tuple[str, dict[str, float]]]:
-    """Return the variables of a table's row at each number of the second argument, with a description of the place."""
+    """Return the variables of each table column, with a text that names the value of the second argument."""
     found: list[tuple[str, dict[str, float]]] = []
     for table in contact.law.tables:
         if table.across is not None:

@@ -27,7 +27,7 @@ _STRIDES = tuple(2**k for k in range(13, 0, -1))
 
 
 def written_out(model: Any) -> dict[str, Any]:
-    """Return declarations of a model as the engine computes them, without elements and directions of guards."""
+    """Return the declarations of a model after elements and guards with a direction have been converted."""
     forms = _Forms(model)
     for element in model.elements:
         element.refuse_unless_complete()
@@ -134,7 +134,7 @@ class _Forms:
         return Component(element.name, (mode,), place=place)
 
     def _strides(self, element: Element, whole: str, sign: str) -> Iterator[Choice]:
-        """Yield the choices of a quantizer, from the largest change to a change by one step."""
+        """Yield the choices of a quantizer, beginning with the largest change."""
         for stride in _STRIDES:
             when = f"{sign}(input - whole*step) >= {stride - 0.5}*step"
             yield Choice("on", _form(element, when, whole=whole), {whole: parse_reset(f"+= {sign}{stride}")})
@@ -168,7 +168,7 @@ class _Forms:
             raise element.error(f"element {element.name}: the delay is not known", remedy)
 
     def _queue(self, element: Element, clock: str, ticks: int) -> None:
-        """Add discrete states that store the last samples, which each tick of a schedule shifts by one state."""
+        """Add discrete states that store the last samples; each tick of the clock shifts the samples by one place."""
         schedules = {schedule.name: k for k, schedule in enumerate(self.schedules)}
         if clock not in schedules:
             message = f"element {element.name}: unknown clock '{clock}'"

@@ -22,7 +22,7 @@ _FOR_LOW_VALUES = "; for a relay that is on at low values, change the sign of th
 
 @dataclass(frozen=True)
 class Requirement(Declared):
-    """A value `low` that has to be below `high` for all parameters of a run.
+    """The requirement that a value `low` is below a value `high` for the parameters of every run.
 
     name : the element. fields : what the two values are in it, None for zero.
     """

@@ -49,7 +49,7 @@ class IndexedExpression:
     references: tuple[Reference, ...] = field(default=(), compare=False, repr=False)
 
     def at(self, number: int | None, repeats: Mapping[str, int]) -> Expression:
-        """Return the expression for one number of the part.
+        """Return the ordinary expression for the copy with a given number.
 
         A condition on i alone is decided first, so that the other branch need not exist. ``block[3].x`` becomes
         ``block3.x``.

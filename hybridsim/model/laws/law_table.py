@@ -216,12 +216,12 @@ class LawTable(Declared):
         return substitute(parse(" + ".join(terms)), named)
 
     def arguments(self) -> list[frozenset[str]]:
-        """Return the names in each argument."""
+        """Return the names that occur in each argument of the table."""
         return [frozenset(e.names) for e in (self.over, self.across) if e is not None]
 
     @property
     def is_at_rest(self) -> bool:
-        """Whether the table has a value in stick: its argument is the speed, or no argument contains the speed."""
+        """Whether the table has a value in stick: it is a table of the speed, or it does not depend on the velocity."""
         first, *second = self.arguments()
         return (self.over.text == "v" or "v" not in first) and not any("v" in names for names in second)
 

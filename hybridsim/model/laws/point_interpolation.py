@@ -54,7 +54,7 @@ def texts(at: Sequence[float], values: Sequence[float], way: str) -> list[str]:
 
 
 def texts_of_names(at: Sequence[float], names: Sequence[str]) -> list[str]:
-    """Return linear functions as `texts` does, with variables as the values at the points."""
+    """Return linear functions as text, between points whose values are variables."""
     found = [names[0]]
     for (x, name), (x1, name1) in pairwise(zip(at, names, strict=True)):
         found.append(f"{name} + (a - ({x!r}))*(({name1} - {name})/{x1 - x!r})")

@@ -254,7 +254,7 @@ class Component(Declared):
 
     @property
     def variables(self) -> tuple[str, ...]:
-        """The variables that the modes set: first the unknown of the surface, then others in order of appearance."""
+        """The variables that the modes set; the unknown of the surface comes first."""
         unknown = [self.surface.unknown] if self.surface else []
         return tuple(dict.fromkeys(unknown + [name for mode in self.modes for name in mode.set]))
 
@@ -278,7 +278,7 @@ class Corner(Component):
 
 @dataclass(frozen=True)
 class MonitorCorner(Corner):
-    """A corner in place of a monitor, for compiled loops (`hybridsim.engine.events.monitor_corners`)."""
+    """A corner that replaces a monitor, so that compiled loops can run the model."""
 
 
 @dataclass(frozen=True)

@@ -154,12 +154,12 @@ class Contact(Declared):
 
     @property
     def table_variables(self) -> tuple[str, ...]:
-        """The names of the variables with the values of the law's tables."""
+        """The names of the variables that contain the values of the law's tables."""
         return tuple(self.variable(table.name) for table in self.law.tables)
 
     @property
     def table_speed(self) -> str | None:
-        """The name of the variable that is the argument of tables of the speed, or None without tables."""
+        """The name of the variable with which tables of the speed are read, or None if there is no such table."""
         asked = any(SPEED in names for table in self.law.tables for names in table.arguments())
         return self.variable(SPEED) if asked and self.law.is_set_valued else None
 
@@ -209,12 +209,12 @@ class Contact(Declared):
         return Component(self.name, modes, surface=surface, place=self.place)
 
     def onset_force(self, backward: bool = False) -> Expression:
-        """Return the magnitude of the force at the onset of slip, in the names of the model."""
+        """Return the magnitude of the force at the onset of slip, as an expression in names of the model."""
         slip = (self.law.slip_backward if backward else None) or self.law.slip
         return self._at_rest(f"onset{backward}", slip, {SPEED: parse(0)})
 
     def slip_force(self, speed: Expression, *, backward: bool = False) -> Expression:
-        """Return the magnitude of the slip force at a speed >= 0, in the names of the model."""
+        """Return the magnitude of the slip force at a speed >= 0, as an expression in names of the model."""
         slip = (self.law.slip_backward if backward else None) or self.law.slip
         assert slip is not None  # always set in a set-valued law
         return substitute(self._form("slip", slip=slip), {SPEED: speed, **self.values()})
@@ -232,7 +232,7 @@ class Contact(Declared):
         return {table.name: table.expression_at(speed, self.variable(table.name)) for table in tables}
 
     def limit_force(self, backward: bool = False) -> Expression:
-        """Return the largest force in stick, in the names of the model."""
+        """Return the largest force in stick, as an expression in names of the model."""
         stick = (self.law.stick_backward if backward else None) or self.law.stick
         return self._at_rest(f"limit{backward}", stick, {})
 

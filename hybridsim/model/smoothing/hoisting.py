@@ -38,7 +38,7 @@ def jump_inside(work: RewritingState, node: ast.expr, here: Here) -> ast.expr | 
 
 
 def open_jumps(work: RewritingState, node: ast.expr, here: Here) -> Mapping[Family, ast.expr]:
-    """Return, by family, the arguments of the jumps in a tree that surfaces can replace."""
+    """Return the arguments of the jumps in a tree that switching surfaces can replace."""
     if not work.has_jumps:
         return {}
     found: dict[Family, ast.expr] = {}

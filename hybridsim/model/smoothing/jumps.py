@@ -44,7 +44,7 @@ class Jump:
     blended: set[str] = field(default_factory=set)
 
     def signed(self, sign: int) -> ast.expr:
-        """Return the sign variable, or its negative, for an argument with a given relative sign."""
+        """Return the sign of an argument as a name, negated if the argument has the opposite sign."""
         unknown = ast.Name(self.unknown, ast.Load())
         return unknown if sign == self.sign else ast.UnaryOp(ast.USub(), unknown)
 
@@ -88,7 +88,7 @@ class Borders:
         self._of_gaps = positions.union(*speeds) & self._moving
 
     def refusal(self, argument: ast.expr) -> str:
-        """Return why a jump at the zeros of an argument is not replaced, or an empty text."""
+        """Return the reason why a jump at the zeros of an argument is not replaced, or an empty text."""
         tree = self._meanings.written_out(argument)
         names = names_of(tree)
         if names & self._switched:
@@ -104,7 +104,7 @@ class Borders:
         return "the compared expression may stay at zero, since neither time nor a changing state moves it"
 
     def is_only_passed(self, argument: ast.expr) -> bool:
-        """Return whether motions can only cross a border, because no force or jump acts on its argument."""
+        """Return whether an argument can only pass through zero, because no force or jump affects its rate."""
         names = names_of(self._meanings.written_out(argument)) & self._moving
         if names & self._changed:
             return False
@@ -112,7 +112,7 @@ class Borders:
         return not any(names_of(rate) & self._switched or _jumps(rate) for rate in rates)
 
     def conflict(self, argument: ast.expr, jumps: Iterable[Jump]) -> str:
-        """Return why a border conflicts with other surfaces and jumps, or an empty text."""
+        """Return the reason why a border conflicts with other surfaces and jumps, or an empty text."""
         if self.is_timed(argument) or self.is_only_passed(argument):
             return ""
         others = [*self._surfaces, *(jump.argument for jump in jumps if not jump.is_timed)]
@@ -222,7 +222,7 @@ def product_of_signs(meanings: Meanings, first: ast.expr, second: ast.expr) -> a
 
 
 def not_linear(trees: Iterable[tuple[str, ast.expr]], carried: Mapping[str, Set[str]]) -> set[str]:
-    """Return the signs in which an expression is not linear.
+    """Return the names of sign functions that enter an expression nonlinearly.
 
     `trees` contains the expressions of names, and of rates without a name. `carried` maps signs, forces and variables
     that jump with them to these signs.

@@ -154,12 +154,12 @@ class Rewriting(RewritingState):
         return self._side(made, (border, whole, whole, whole), here)
 
     def is_smooth(self, argument: ast.expr) -> bool:
-        """Return whether an expression has neither corners nor jumps, by its form."""
+        """Return whether the form of an expression shows that it has neither corners nor jumps."""
         parts = ast.walk(self.meanings.written_out(argument))
         return not any(isinstance(part, ast.IfExp) or sides_of(part) for part in parts)  # type: ignore[arg-type]  # others have none
 
     def _signs(self, here: Here, family: Family, sign: int) -> Mapping[Family, int]:
-        """Return the known signs, extended by the sign of another family."""
+        """Return the known signs, with one more expression whose sign is known."""
         known = {**here.signs, family: sign}
         return self._known_signs.setdefault(frozenset(known.items()), known)
 
@@ -293,13 +293,13 @@ class Rewriting(RewritingState):
         return self._met[id(node)][1]
 
     def _is_limited(self, branch: ast.expr, argument: ast.expr, family: Family, sign: int) -> bool:
-        """Return whether the expression of one side, such as a root, may have no value on the other side."""
+        """Return whether the expression for one sign, such as a root, may be undefined for the other sign."""
         border = names_of(self.meanings.written_out(argument)) & self.meanings.moving
         side = resolved(self.meanings, branch, {family: sign})
         return any(names_of(base) & border for base in limited(side, self.meanings))
 
     def _is_step(self, family: Family, argument: ast.expr, here: Here, agrees: bool) -> bool:
-        """Return whether a signal represents a condition on time at this place of the model."""
+        """Return whether a signal can represent a condition on time at this place of the model."""
         may_be_timed = here.untouched or (here.times and not agrees) or family in self.timed
         return bool(may_be_timed) and self.borders.is_timed(argument) and not self.borders.refusal(argument)
 
@@ -315,7 +315,7 @@ class Rewriting(RewritingState):
         return self.steps[family][0]
 
     def timed_by_form(self) -> set[Family]:
-        """Return the borders of jumps and corners in time that signals can represent."""
+        """Return the families of jumps and corners whose sign depends on time alone and can be given by a signal."""
         found = {family: one.argument for family, one in self.jumps.items()}
         found |= {family: one.argument for family, one in self.corners.items()}
         return {f for f, border in found.items() if self.borders.is_timed(border) and self._step(f, border)}
@@ -331,7 +331,7 @@ class Rewriting(RewritingState):
         return with_names(_EITHER, names)
 
     def _jump(self, node: ast.expr, parts: Sides, family: Family, sign: int, here: Here) -> ast.expr:
-        """Return the replacement of a non-smooth function whose sides differ."""
+        """Return the replacement of a non-smooth function that jumps at its border."""
         argument, above, below, _ = parts
         if self.borders.is_timed(argument):
             reason = (

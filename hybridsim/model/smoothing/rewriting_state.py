@@ -106,14 +106,14 @@ class RewritingState:
         )
 
     def _left(self, family: Family, argument: ast.expr, here: Here) -> str:
-        """Return why a jump is not replaced, or an empty text."""
+        """Return the reason why a jump is not replaced, or an empty text if it can be replaced."""
         reason = here.jumps
         if here.is_passing and self.borders.is_only_passed(argument):
             reason = ""
         return reason or self.refusal or self.refused.get(family, "") or self._border(family, argument)
 
     def _border(self, family: Family, argument: ast.expr) -> str:
-        """Return why a border cannot become a switching surface, or an empty text."""
+        """Return the reason why a border cannot become a switching surface, or an empty text."""
         if family in self.jumps:
             return ""
         return self.borders.refusal(argument) or self.borders.conflict(argument, self.jumps.values())
@@ -129,7 +129,7 @@ class RewritingState:
         return not (isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "sign")
 
     def _owner(self, family: Family) -> int | None:
-        """Return a component whose modes determine the side of an expression, or None."""
+        """Return the number of a component whose modes determine the sign of an expression, or None."""
         for c, modes in enumerate(self.signs):
             if modes and all(family in signs for signs in modes):
                 return c

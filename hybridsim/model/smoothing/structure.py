@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def structure(model: Model) -> str:
-    """Return one line for each relevant part; models with equal texts share their generated code."""
+    """Return the structure of a model as text; models with equal texts share their generated code."""
     return "\n".join(_lines(model)) + "\n"
 
 

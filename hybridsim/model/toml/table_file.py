@@ -17,7 +17,7 @@ MAX_BYTES = 64_000_000
 def numbers_from_file(
     table: Table, folder: Path, keys: tuple[str, str], what: str
 ) -> dict[str, tuple[float, ...]]:
-    """Return, by the two given keys, the numbers of a table that has the keys ``file`` and ``columns``.
+    """Read the columns of a table from a CSV file, and return the numbers under the two given keys.
 
     Parameters
     ----------

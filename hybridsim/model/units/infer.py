@@ -201,7 +201,7 @@ def factors_of(node: ast.expr, sign: int = 1) -> Iterator[tuple[ast.expr, int]]:
 
 
 def _is_pure(number: ast.expr) -> bool:
-    """Return whether a factor consists of small multiples of 1/4 and pi."""
+    """Return whether a factor contains only pi and small multiples of 1/4."""
     return all(
         value <= _COUNT and (4 * value) % 1 == 0
         for node in ast.walk(number)

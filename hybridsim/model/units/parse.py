@@ -66,7 +66,7 @@ def read_unit(text: str) -> Unit | None:
 
 
 def write_unit(unit: Unit, preferred: Iterable[str] = ()) -> str:
-    """Return a unit as text: a preferred text or a usual text of this unit, if there is one."""
+    """Return a unit as text, if possible as one of the preferred or usual texts."""
     if not unit.powers and unit.scale == 1.0:
         return "1"
     for text in (*preferred, *_SHOWN):

@@ -70,7 +70,7 @@ def _uses(model: Model) -> Iterator[_Use]:
 
 
 class _Witnesses:
-    """The expressions that determine units of names: expressions that set a name, and expressions that use a name."""
+    """The expressions that determine the units of names: those that set a name and those that use a name."""
 
     def __init__(self, model: Model, known: Quantities) -> None:
         self.known = known
@@ -137,7 +137,7 @@ def _resets(model: Model) -> Iterator[Mapping[str, Expression]]:
 
 
 def _solved(known: Quantities, node: ast.expr, required: tuple[Unit, ...], name: str) -> Iterator[Unit]:
-    """Yield the units of a name that give an expression one of the given units, and all terms of a sum equal units."""
+    """Yield the units that a name must have so that an expression has one of the given units."""
     match node:
         case ast.Name(id=own) if own == name:
             yield from required

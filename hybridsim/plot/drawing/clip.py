@@ -151,7 +151,7 @@ def _draw(artist: Artist, axes: Axes, canvas: FigureCanvasAgg) -> None:
 
 
 def _round_speed(speed: float, has_seconds: bool) -> float:
-    """Round a speed to 1, 2 or 5 times a power of ten; if time is in seconds, round a speed near 1 to real time."""
+    """Round a speed to 1, 2 or 5 times a power of ten; a speed near real time becomes real time."""
     if has_seconds and 0.4 <= speed <= 2.0:
         return 1.0
     power = 10.0 ** math.floor(math.log10(speed))

@@ -93,7 +93,7 @@ def shared_powers(quantities: Mapping[str, tuple[str, float, float]]) -> dict[st
 
 
 def _misfit(power: int, sizes: Iterable[float]) -> float:
-    """Return the number of digits by which numbers are outside 1 to 1000, plus a small amount for a prefix."""
+    """Return how many digits lie outside the range 1 to 1000 in total, plus a small penalty for a prefix."""
     over = (max(power - size, size - power - 3, 0.0) for size in sizes)
     return round(sum(over) + (_PREFIX_COST if power else 0.0), 9)
 

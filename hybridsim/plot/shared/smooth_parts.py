@@ -152,7 +152,7 @@ def _input_jumps(solution: Solution, window: Window) -> NDArray[np.float64]:
 
 
 def _whole(periods: float) -> int:
-    """Return a number of periods without its fraction."""
+    """Round a number of periods down to an integer."""
     return math.floor(periods * (1 + _WHOLE))
 
 

@@ -76,6 +76,6 @@ def draw_strip(axis: Axes, solution: Solution, components: Sequence[str], window
 
 
 def _columns(axis: Axes) -> int:
-    """Return the number of lines of the least visible width that fit into a strip."""
+    """Return the largest number of visible vertical lines that fit into a mode strip."""
     whole = style.figure_of(axis)
     return max(20, int(72 * whole.get_figwidth() * axis.get_position().width / _HAIRLINE))

@@ -70,7 +70,7 @@ class SlipPhase:
         return (own.real if n else self.centre + own.real) + forced.imag
 
     def bound(self, n: int, s: float) -> float:
-        """Return a bound of the magnitude of the n-th derivative from s on, n > 0."""
+        """Return a bound on the magnitude of the n-th derivative (n > 0) at all times after s."""
         own = abs(self.own) * math.exp(self.rate.real * s) * self.natural**n
         return own + abs(self.response) * self.frequency**n
 

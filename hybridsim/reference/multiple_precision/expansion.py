@@ -63,7 +63,7 @@ class Expansion:
 
     @cached_property
     def reach(self) -> Number:
-        """Return the time over which the series are accurate relative to their own terms."""
+        """Return the time over which the last terms of each series are negligible relative to its other terms."""
         return self.reach_above([self.precision.context.zero] * len(self.states))
 
     def reach_above(self, sizes: Sequence[Number]) -> Number:

@@ -36,7 +36,7 @@ class Programs:
 
     @property
     def first_modes(self) -> Modes:
-        """Return the modes before the first choice of modes."""
+        """Return the declared initial modes; the other modes are undecided."""
         return tuple(component.initial or UNDECIDED for component in self.components)
 
     def decided(self, modes: Modes) -> Modes:
@@ -53,7 +53,7 @@ class Programs:
         return tuple(changed)
 
     def modes_by_side(self, point: Point, modes: Modes) -> Modes:
-        """Return the modes with undecided components on their sides, or holding if on the surface."""
+        """Return the modes with every undecided component on the side of its surface, or holding a surface at zero."""
         if UNDECIDED not in modes:
             return modes
         decided = self.decided(modes)

@@ -180,7 +180,7 @@ class Run:
             self._adopt(self.rules.resolve_event(settled.point, settled.modes, (), resets))
 
     def _act(self, monitors: Sequence[int], point: Point) -> None:
-        """Process some monitors at a point: they reset states or end the run."""
+        """Process the given monitors at a point: apply their resets, or end the run."""
         settled = self.rules.resolve_event(
             point, self.now.modes, (), self._record_monitors(monitors, point.t)
         )

@@ -137,7 +137,7 @@ class Rules:
         return [c for c, component in enumerate(self.components) if component.surface]
 
     def _take_sides(self, point: Point, modes: Modes, moves: list[Move]) -> tuple[Modes, set[int]]:
-        """Set components to the modes of their sides; return the undecided components on their surfaces."""
+        """Choose the mode of each surface that is not zero; return the undecided components whose surface is zero."""
         order = self._surfaces()
         if not order:
             return modes, set()
@@ -203,7 +203,7 @@ class Rules:
         return surface is not None and modes[c] == surface.hold
 
     def _best(self, point: Point, modes: Modes, chosen: Sequence[int], deciding: set[int]) -> Modes:
-        """Return the admissible modes with the fewest changes; changes of components without an event count first."""
+        """Return the admissible modes that change the fewest components, especially those that have no event."""
         scores: dict[tuple[int, int, int], list[Modes]] = {}
         for combination in itertools.product(*([m.name for m in self.components[c].modes] for c in chosen)):
             candidate = list(self.programs.decided(modes))

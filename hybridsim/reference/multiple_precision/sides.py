@@ -34,7 +34,7 @@ class Sides:
         return {(c, j) for c, j in guards if c not in self.led}
 
     def along(self, point: Point, modes: Modes) -> Modes:
-        """Return the modes with each corner and load on its side along the flow."""
+        """Return the modes in which every corner and load is on the side that the flow enters."""
         if not self.led:
             return modes
         has_flow = UNDECIDED not in modes
@@ -59,7 +59,7 @@ class Sides:
         )
 
     def taken(self, point: Point, modes: Modes, moves: list[Move]) -> Modes:
-        """Return the modes with each corner and load on its side, and append the changes to `moves`."""
+        """Put every corner and load on the side that the flow enters, and append the changes of mode to `moves`."""
         after = self.along(point, modes)
         for c in self.led:
             if after[c] != modes[c]:

@@ -44,7 +44,7 @@ class Signal:
         return self.declared.kind == "chirp" or self.declared.shape == "sine"
 
     def piece(self, t: Number) -> tuple[Number, ...]:
-        """Return the knot and the four coefficients of the piece from a time on."""
+        """Return the start and the four coefficients of the cubic piece that begins at or before a time."""
         zero = self.number(0)
         if self.declared.kind == "table":
             index = bisect_right(self._times, t)

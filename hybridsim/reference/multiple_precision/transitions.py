@@ -1,4 +1,4 @@
-"""This module applies declared transitions, with choices of guards, and with all resets together."""
+"""This module applies declared transitions: it selects the choices of guards and combines all resets."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""This module describes the guards, and the combinations of modes that a decision judged."""
+"""This module describes combinations of modes that were examined at an event, with their guards."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ class Candidate:
 def views(
     system: System, at: Situation, z: np.ndarray, guards: list[int], decreed: np.ndarray
 ) -> Iterable[GuardView]:
-    """Yield guards along the flow of the modes `z`; values that the event sets to zero are exact."""
+    """Yield the guards in the modes `z`, with their values and signs just after the event."""
     series = system.series(at.s, at.x, at.p, z, at.x_error, at.s_error, at.is_put)
     time = time_unit(system.model)
     for g in guards:

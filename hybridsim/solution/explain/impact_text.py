@@ -44,7 +44,7 @@ def is_struck(system: System, change: Change) -> bool:
 
 
 def errors_beside(stage: Stage, c: int) -> np.ndarray:
-    """Return rounding bounds of the states that an impulse of a contact can change."""
+    """Return bounds on the rounding errors of the states that an impulse of a contact can change."""
     system, at = stage.resolution.system, stage.before
     cluster = next(cluster for cluster in system.clusters if c in cluster)
     _, changes, _ = system.impulses(at.s, at.x, at.p, np.maximum(at.z, 0))

@@ -1,4 +1,4 @@
-"""This module describes how a monitor left zero or its side of zero."""
+"""This module describes how a monitor left zero, or crossed zero."""
 
 from __future__ import annotations
 

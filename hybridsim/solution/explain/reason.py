@@ -76,13 +76,13 @@ class _Led(NamedTuple):
 
     @property
     def subject(self) -> str:
-        """The causes as the subject of a sentence, or an empty text without causes."""
+        """Return the causes as the subject of a sentence, or an empty text if there are none."""
         text = " and ".join([*self.clauses, *self.nouns])
         return f"{text}, which" if self.clauses else text
 
     @property
     def start(self) -> str:
-        """The causes as the start of a sentence, or an empty text without causes."""
+        """Return the causes as the start of a sentence, or an empty text if there are none."""
         after = [f"after {' and '.join(self.nouns)}"] if self.nouns else []
         text = " and ".join([*self.clauses, *after])
         return f"{text}: " if text else ""

@@ -25,7 +25,7 @@ _FIRST_PIECE = "1"  # the name of the first mode of a table's component; its mod
 
 
 def remarks(solution: Solution, occurrence: Occurrence, together: Sequence[Occurrence]) -> tuple[str, ...]:
-    """Return remarks on facts that the guards do not show, as text; `together` has all events of the instant."""
+    """Return remarks on facts that the guards do not show; `together` contains all events of the instant."""
     if solution._save != "all":
         return ()  # the modes and the motion around the event were not kept
     system = solution._system

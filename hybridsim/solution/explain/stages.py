@@ -54,7 +54,7 @@ class Stage:
 
 @dataclass(frozen=True)
 class Place:
-    """The stage of an instant at which a transition was made."""
+    """A change of mode, with the choice of modes (stage) that made it."""
 
     stage: Stage
     change: Change | None
@@ -63,7 +63,7 @@ class Place:
 def place_of(
     run: Run, segment: Segment, together: Sequence[Occurrence], fired: list[int], occurrence: Occurrence
 ) -> Place | None:
-    """Return the stage at which a transition was made, among the records of its instant."""
+    """Return the choice of modes that made a transition, found among the records of the same instant."""
     instant = _Instant(run, segment, together)
     stages = list(instant.located(fired))
     found, left = _matched(run.system, instant.transitions, stages)
@@ -82,7 +82,7 @@ def place_of(
 def _matched(
     system: System, transitions: Sequence[Occurrence], stages: Sequence[Stage]
 ) -> tuple[dict[int, Place], list[Occurrence]]:
-    """Assign transitions to stages; return the stages by index, and the transitions without a stage."""
+    """Assign transitions to stages; return the places by number of the transition, and the unassigned transitions."""
     made = [Place(stage, change) for stage in stages for change in stage.changes]
     found, left, start = {}, [], 0
     for number, occurrence in enumerate(transitions):
@@ -130,7 +130,7 @@ class _Instant:
         ]
 
     def located(self, fired: list[int]) -> list[Stage]:
-        """Return the stages of located guards and monitors."""
+        """Return the choices of modes that located guards and monitors caused."""
         at = situation(self.system, self.segment, fired)
         found = self._nothing(at, {g: k for k, g in enumerate(fired)})
         if self.is_general and (self.schedules or self.knots) and (fired or self.stopping):
@@ -142,13 +142,13 @@ class _Instant:
         return [self._settled(found, self.stopping, (), begins=found.inputs is not None)]
 
     def _nothing(self, at: Situation, fired: dict[int, int] | None = None) -> Located:
-        """Return a `Located` with given guards, in which no monitor is at zero."""
+        """Return a `Located` with the given guards at zero and no monitors at zero."""
         monitors = self.system.model.monitors
         none = MonitorSides.of(monitors, np.zeros(len(monitors), dtype=np.int64))
         return Located(at, fired or {}, none, True)
 
     def crossed(self, stage: Stage) -> Stage | None:
-        """Return the stage of monitor resets that an earlier stage caused, or None."""
+        """Return the choice of modes after monitor resets that an earlier choice caused, or None."""
         sides = stage.outcome.monitor_sides
         crossed = [k for k, way in self.monitors.items() if k not in self.stopping and sides[k] != -way]
         if not crossed:
@@ -158,7 +158,7 @@ class _Instant:
         return self._settled(self._nothing(at), crossed, ())
 
     def due(self, stage: Stage | None, first: Occurrence | None) -> list[Stage]:
-        """Return the stages of events that were due, and of their resets."""
+        """Return the choices of modes that due events, and the resets of these events, caused."""
         system, segment = self.system, self.segment
         if first is None or not (self.schedules or self.knots):
             return []
@@ -174,7 +174,7 @@ class _Instant:
     def _settled(
         self, found: Located, monitors: Sequence[int], schedules: Sequence[int], begins: bool = False
     ) -> Stage:
-        """Choose the modes of one stage; `begins` is true if inputs change their pieces at this stage."""
+        """Choose the modes once; `begins` is true if an input begins a new piece at this instant."""
         system, model, at = self.system, self.system.model, found.at
         keys = [("monitor", k) for k in monitors] + [("schedule", k) for k in schedules]
         before = Situation(at.s, at.x.copy(), at.p.copy(), at.z.copy(), at.x_error.copy(), at.s_error)

@@ -16,7 +16,7 @@ from hybridsim.solution.run import Run
 
 
 class SegmentConstants(NamedTuple):
-    """What is constant in a segment: its modes (C,) and its run-time vector."""
+    """The modes (C,) and the run-time vector of a segment, which are constant during the segment."""
 
     z: np.ndarray
     p: np.ndarray
@@ -27,7 +27,7 @@ MOST_POINTS = 1 << 27  # rows per column: one gigabyte
 
 
 def constants_of(block: SegmentBlock | SegmentList, i: int) -> SegmentConstants:
-    """Return what is constant in a segment of a block; its motion is not computed."""
+    """Return the constants of segment i of a block without computing the motion."""
     if isinstance(block, SegmentList):
         return SegmentConstants(block[i].z, block[i].p)
     return SegmentConstants(block.modes[i], block.vectors[i])

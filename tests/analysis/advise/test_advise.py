@@ -323,7 +323,8 @@ def test_it_says_that_no_simpler_model_could_be_tried() -> None:
 def test_verdicts_say_what_there_is_to_say() -> None:
     found = hs.advise(hardening(2.0), "amplitude.x", rungs=["mu_s=mu_k", "no-stop"])
     assert (
-        found["mu_s=mu_k"].verdict == "nothing to drop" and "already equals its kinetic friction at v = 0" in found["mu_s=mu_k"].why
+        found["mu_s=mu_k"].verdict == "nothing to drop"
+        and "already equals its kinetic friction at v = 0" in found["mu_s=mu_k"].why
     )
     assert found["no-stop"].verdict == "does not apply"
     exact = next(setting for setting in found.settings if setting.integrator == "exact")

@@ -21,7 +21,7 @@ MAP_POINTS = {
 
 @dataclass(frozen=True)
 class Readings:
-    """Least, mean and greatest signed deviation of A from the exact value, by interpretation and by point."""
+    """Least, mean and greatest signed deviation of A from the exact value, for each interpretation and each point."""
 
     table: dict[str, dict[str, tuple[float, float, float]]]
 

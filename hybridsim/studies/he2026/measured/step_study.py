@@ -54,7 +54,7 @@ class StepStudy:
         return np.asarray(np.sqrt((self.by_eps[method][quantity] ** 2).mean(axis=0)))
 
     def shrinks(self, quantity: str) -> bool:
-        """Return whether the deviation along the ridge decreases with the step for every interpretation."""
+        """Return whether the deviation along the ridge of the map decreases with the step, for every interpretation."""
         first = STEPS.index(STEPS_PER_PERIOD)
         return all(
             self.along(v.name, quantity)[-1] < _SHRINKS * self.along(v.name, quantity)[first] for v in SIGNS

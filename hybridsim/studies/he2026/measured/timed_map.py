@@ -106,7 +106,7 @@ def time_map(size: Size, pool: Pool) -> TimedMap:
 def _map(
     rows: list[list[Point]], pool: Pool, begin: float, end: float
 ) -> tuple[float, list[tuple[float, float]]]:
-    """Return the seconds per point, and A and E of each point in the last of many periods from rest."""
+    """Time many periods from rest; return the seconds per point, and A and E of the last period of each point."""
 
     def tell(done: int, total: int, _: str) -> None:
         pool.tell(begin + (end - begin) * done / total)

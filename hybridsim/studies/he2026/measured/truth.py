@@ -39,13 +39,13 @@ class Truth:
     boundary: tuple[np.ndarray, np.ndarray]
 
     def deviation(self, model: str) -> np.ndarray:
-        """Return |A of the model - A|/A, or nan if nothing moves or the model has no answer."""
+        """Return the relative error of the amplitude A of a model, or nan if it is undefined."""
         with np.errstate(divide="ignore", invalid="ignore"):
             value = np.abs(self.models[model] - self.amplitude) / self.amplitude
         return np.asarray(np.where(self.amplitude > 0.0, value, np.nan))
 
     def to_plain(self) -> dict[str, Any]:
-        """Return the numbers without the maps, for a JSON file."""
+        """Return the results without the maps, for a JSON file."""
         free = self.stick == 0.0
         moving = self.amplitude > 0.0
         off = self.deviation(NO_STOPS)
