@@ -209,7 +209,7 @@ class Simulator(CurrentState):
             target = arguments.finite_number(to, "to")
             if target < position.t:
                 raise UsageError(
-                    f"`to` is {to!r}, and the simulator is already at {position.t!r}",
+                    f"`to` is {to!r}, but the simulator is already at {position.t!r}",
                     remedy="use a later time, or sim.restore() for an earlier state",
                 )
             if discrete is not None:

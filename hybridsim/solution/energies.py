@@ -141,7 +141,7 @@ class Energies(EventsAndModes):
         """
         if not hasattr(self.model, "M"):
             raise UsageError(
-                f"{self.model.name} does not declare masses, so that its stored energy is unknown",
+                f"{self.model.name} does not declare masses, so its stored energy is unknown",
                 remedy="declare the energy as an output, hs.Output('E', 'm*v**2/2 + k*x**2/2'), and "
                 "read sol['E']",
             )

@@ -40,7 +40,7 @@ def resumed(
         )
     if not sign * (end - solution.t_end) >= 0.0:
         raise UsageError(
-            f"`t_end` is {t_end!r}, and the run is already at {solution.t_end!r}", remedy="use a later time"
+            f"`t_end` is {t_end!r}, but the run is already at {solution.t_end!r}", remedy="use a later time"
         )
     record = trajectory.up_to_checkpoint(run.system)
     task = replace(task, t1=end, limits=arguments.run_limits(limits), record=record)

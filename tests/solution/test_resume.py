@@ -140,7 +140,7 @@ def test_ctrl_c_ends_a_loop_of_runs(interruptible: None) -> None:
 
 @pytest.mark.parametrize(
     ("limits", "word"),
-    [({"events": 5}, "events"), ({"steps": 5}, "steps"), ({"seconds": 1e-9}, " s have passed, and")],
+    [({"events": 5}, "events"), ({"steps": 5}, "steps"), ({"seconds": 1e-9}, " s have passed, but")],
 )
 def test_limits_are_named(limits: dict[str, float], word: str) -> None:
     part = hs.simulate("belt", (0.0, 100.0), integrator="scipy-dop853", limits=limits)

@@ -31,7 +31,7 @@ def forcing_period_of(system: MechanicalSystem) -> float:
     rates = [abs(rate) for rate in rates_of(system) if rate != 0.0]
     if not rates:
         raise UsageError(
-            f"{system.name} has no harmonic force or base: the period of its motion is unknown",
+            f"{system.name} has no harmonic force or base motion, so the period of its motion is unknown",
             remedy="use hs.steady_state(system.to_model()), or add an hs.Harmonic to the forcing",
         )
     period = common_multiple([2.0 * math.pi / rate for rate in rates])

@@ -108,7 +108,7 @@ def period_of(model: Model) -> float:
     period = common_period(system_of(model))
     if period is None:
         raise UsageError(
-            f"model {model.name} has no periodic forcing: there is no last period",
+            f"model {model.name} has no periodic forcing, so there is no last period",
             remedy="remove `after`, or use hs.steady_state, which also finds unforced motions",
         )
     return period

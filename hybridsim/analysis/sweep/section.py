@@ -100,7 +100,7 @@ def sampling_period(model: Model) -> float:
     if period is None:
         raise UsageError(
             f"model {model.name} has no single forcing period",
-            remedy="set `section` to an expression that passes zero upward, such as 'v'",
+            remedy="set `section` to an expression that increases through zero, such as 'v'",
         )
     return period
 

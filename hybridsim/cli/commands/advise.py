@@ -63,7 +63,9 @@ def add_to(commands: Any) -> None:
         "velocity width of the regularised forces (default: 1 %% of the largest sliding speed)",
         values.positive,
     )
-    parser.add_argument("--no-integrators", action="store_true", help="skip the integrator settings")
+    parser.add_argument(
+        "--no-integrators", action="store_true", help="do not compare settings of the integrators"
+    )
     options.add_workers(parser, " for --over")
     options.add_budget(parser, "120; unlimited with --over")
     options.add_plot(parser, "the result")

@@ -40,7 +40,8 @@ def add_to(commands: Any) -> None:
     parser.add_argument(
         "--units",
         action="store_true",
-        help="print the unit of each quantity and expression: declared, inferred, unknown or in disagreement",
+        help="print the unit of each quantity and expression, and whether it is declared, inferred, unknown or "
+        "inconsistent",
     )
     parser.set_defaults(execute=execute)
 

@@ -52,8 +52,8 @@ def require_dissipation(
             name = system.automata[c].name
             place = system.model.all_components()[c].place
             raise ModelError(
-                f"contact {name}: the force {name} acts along its relative velocity, not against it "
-                f"(its effect on the relative acceleration is {effect:.6g} and must be negative)",
+                f"contact {name}: the force {name} acts along the relative velocity, not against it (the effect of "
+                f"the force on the relative acceleration is {effect:.6g}, but must be negative)",
                 place=place,
                 remedy=f"write '- {name}' in the derivative of the velocity, or reverse the sign of the velocity",
             )

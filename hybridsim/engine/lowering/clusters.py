@@ -34,11 +34,11 @@ def normal_loads(
                     e.free_symbols & set(unknown.values()) for e in slopes.values()
                 ):
                     raise ModelError(
-                        f"{component.name} may use the normal force {declared_name(u)} of an impact only as a load to "
-                        "which its slip force and its stick limits are proportional",
+                        f"{component.name} may use the normal force {declared_name(u)} of an impact only as its "
+                        "load, and its slip force and stick limits must be proportional to this load",
                         place=component.place,
-                        remedy="use a friction law that is linear in its load, and use "
-                        f"{declared_name(u)} elsewhere only in the rates of states",
+                        remedy="use a friction law that is linear in its load; apart from the load, use "
+                        f"{declared_name(u)} only in rates of states",
                     )
                 if own is not None:
                     by_mode = found.setdefault((c, normal[u]), {})

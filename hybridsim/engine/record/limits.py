@@ -46,19 +46,19 @@ class LimitMonitor:
         limits, counters = self.limits, self.counters
         if counters.events - self._events >= limits.events:
             raise LimitReached(
-                f"{counters.events - self._events} events were reached, and {limits.events:g} were allowed"
+                f"{counters.events - self._events} events were reached, but at most {limits.events:g} are allowed"
             )
         if counters.steps - self._steps >= limits.steps:
             raise LimitReached(
-                f"{counters.steps - self._steps} steps were taken, and {limits.steps:g} were allowed"
+                f"{counters.steps - self._steps} steps were taken, but at most {limits.steps:g} are allowed"
             )
         seconds = perf_counter() - self._began
         if seconds >= limits.seconds:
-            raise LimitReached(f"{seconds:.3g} s have passed, and {limits.seconds:g} were allowed")
+            raise LimitReached(f"{seconds:.3g} s have passed, but at most {limits.seconds:g} are allowed")
         if limits.megabytes < inf:
             if self._looks % _OFTEN == 0 and (grown := resident_megabytes() - self._size) >= limits.megabytes:
                 raise LimitReached(
-                    f"memory grew by {grown:.0f} MB since the start, and {limits.megabytes:g} MB were allowed"
+                    f"memory grew by {grown:.0f} MB since the start, but at most {limits.megabytes:g} MB are allowed"
                 )
             self._looks += 1
 

@@ -278,8 +278,8 @@ class SegmentRun:
     def _refuse_undefined(self, guard: int, s: float) -> None:
         t = float(self.origin.plus(s))
         raise StepFailure(
-            f"{self.system.guard_title(guard, self.flow.z)} is not a number from t = {t:.9g} on: "
-            f"write the guard so that it has a value on both sides of its zero"
+            f"{self.system.guard_title(guard, self.flow.z)} is not a number from t = {t:.9g} on; write the guard so "
+            "that it is defined on both sides of its zero"
         )
 
     def _fires_in(self, monitor: int, direction: int) -> bool:

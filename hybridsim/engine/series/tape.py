@@ -276,7 +276,7 @@ class TapeBuilder:
         if kind is sp.atan2:
             # after a rotation by the leading angle the rest is an ordinary arc tangent
             return self._op(rows, ops.INTEGRAL, a[1], a[0], ops.ANGLE)
-        raise NotImplementedError(f"no Taylor recurrence for {kind}")
+        raise NotImplementedError(f"there is no Taylor recurrence for {kind}")
 
 
 def _with_exponential(base: Any) -> tuple[Any, Any, Any] | None:

@@ -187,8 +187,8 @@ class _Forms:
         signal = next((one for one in self.inputs if one.name == element.input.text), None)
         if signal is None or signal.kind not in ("table", "wave"):
             raise element.error(
-                f"{what}: '{element.input.text}' cannot be delayed by a time, because a model "
-                "does not store past states",
+                f"{what}: '{element.input.text}' cannot be delayed by a fixed time, because a model does not store "
+                "past states",
                 "set `clock` and `ticks` to delay a sampled value, or approximate the delay by further states; `time` "
                 "delays inputs of kind 'table' and 'wave'",
             )

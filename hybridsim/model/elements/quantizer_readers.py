@@ -35,8 +35,8 @@ def refuse_readers(model: Any, parts: Mapping[str, Any], quantizers: Mapping[str
             raise expr.error(
                 f"{what} reads the quantizer '{name}', which may still have an old value at an event",
                 remedy=f"compare the input '{quantizers[name].input.text}' of the quantizer with the borders "
-                "instead; if this input is sampled, quantize the output of a 'delay' element with `ticks = "
-                "1`",
+                "instead; if this input is sampled, quantize the output of a 'delay' element "
+                "with `ticks = 1`",
             )
 
 

@@ -202,8 +202,8 @@ def _holding_force(model: Model, contact: Contact) -> Expression:
     others = rate.names & {c.name for c in model.contacts if c is not contact}
     if others:
         raise UsageError(
-            f"contact {contact.name}: the force {', '.join(sorted(others))} also acts on its velocity, but 'karnopp' "
-            "supports only independent contacts",
+            f"contact {contact.name}: the force {', '.join(sorted(others))} also acts on the velocity of this "
+            "contact, but 'karnopp' supports only independent contacts",
             remedy="use 'tanh' or 'arctan'",
         )
     effect = slope(rate, contact.name)

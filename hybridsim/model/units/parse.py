@@ -145,7 +145,7 @@ class _Reader:
             if text == "-" or (kind == "number" and self._tokens[self._at - 1][0] == "symbol"):
                 exponent = self._number()  # as in m s-1 and m2
         if symbol == "ms" and exponent < 0:
-            raise _NotAUnit("write the exponent of ms as m s^-1 or as 1/ms")
+            raise _NotAUnit("'ms' with a negative exponent is ambiguous; write m s^-1 or 1/ms")
         return base.power(exponent)
 
     def _atom(self) -> Unit:
