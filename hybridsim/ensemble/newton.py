@@ -25,7 +25,7 @@ _SAME = 10.0  # of the tolerance: the same motion with a shorter period
 
 
 def close_orbit(packs: Any, searches: Any, scratch: Any, i: int, multiple: int, tol: float) -> int:
-    """Find a motion that repeats after some periods by Newton's method; return its number of segments.
+    """Find by Newton's method a motion that repeats after some periods; return its number of segments.
 
     The shortest such number of periods is entered in `searches.counts`, and the motion over them is recorded. Return
     FAILED if the method fails; the state is then as before, that of `scratch.last`. Return NOT_CERTAIN if the motion

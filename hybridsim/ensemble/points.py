@@ -108,7 +108,7 @@ def begin_point(packs: Any, none: Any, fixed: Any, points: Any, found: Any, i: i
 def summarise(
     packs: Any, fixed: Any, record: Any, rows: Any, found: Any, first: int, last: int, begin: float
 ) -> int:
-    """Write the measures of recorded segments to `found`; return 0 if one of them oscillates too often.
+    """Write the measures of recorded segments to `found`; return 0 if a segment has too many oscillations.
 
     The first segment counts from local time `begin` on. record: `LoopRecord`; rows: `ClosedFormRows`.
     """

@@ -67,7 +67,7 @@ class Meanings:
         return found
 
     def depended_on(self, names: Iterable[str]) -> set[str]:
-        """Return some names, and all names on which the definitions among them depend."""
+        """Return the given names, and all names on which their definitions depend."""
         trees: list[ast.expr] = [ast.Name(name, ast.Load()) for name in names]
         return set().union(
             *map(names_of, trees), *(names_of(self.definitions[name]) for name in self.reached(trees))
@@ -83,7 +83,7 @@ class Meanings:
         return inner
 
     def family(self, node: ast.expr) -> tuple[Family, int]:
-        """Return the family of an expression and its multiples, and the sign of the expression in the family."""
+        """Return a key that all multiples of an expression share, and the sign of the expression relative to it."""
         p: Polynomial = polynomial(self.written_out(node))
         number = constant_of(p)
         if number is not None:

@@ -109,7 +109,7 @@ def draw_orbit(
 
 
 def _equal_scales(axes: Axes, spans: Sequence[tuple[float, float]]) -> None:
-    """Draw both axes in one scale, so that a circle is round, unless one extent is far smaller."""
+    """Draw both axes in one scale, so that a circle is round, unless one range is much smaller than the other."""
     wide, high = (high - low for low, high in spans)
     if wide > 0 and high > 0 and 1 / _SLIM < wide / high < _SLIM:
         axes.set_aspect("equal", adjustable="datalim")

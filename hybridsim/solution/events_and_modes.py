@@ -29,7 +29,7 @@ class EventsAndModes(States):
 
     @property
     def corners(self) -> tuple[Event, ...]:
-        """The instants at which a corner (`abs`, `min`, `max`) inside a mode changed its side: kind "corner".
+        """Events of kind "corner": sign changes of the argument of an `abs`, `min` or `max` inside a mode.
 
         The model does not change there: the run continues with the equations of the other side. `events` and
         `modes` do not contain these instants. A `MechanicalSystem` has none.

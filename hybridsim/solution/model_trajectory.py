@@ -80,7 +80,7 @@ class ModelTrajectory(ModelEvents):
 
     @property
     def own_times(self) -> np.ndarray:
-        """Return the times of the steps (m,), with every event time twice."""
+        """Return the times (m,) of the steps; every event time occurs twice."""
         (index, s, _), (starts, ends, origins, _) = self._knots, self.frame
         times = origins[index, 0] + (s + origins[index, 1])
         counts = np.bincount(index, minlength=len(starts))
@@ -99,7 +99,7 @@ class ModelTrajectory(ModelEvents):
         return self.segments[-1].x[-1].copy() if self.segments else self.run.task.x0.copy()
 
     def segment_at(self, times: np.ndarray, side: str) -> tuple[np.ndarray, np.ndarray]:
-        """Return the index of the segment that contains each time, and the local time in it."""
+        """Return, for each time, the index of its segment and the local time in this segment."""
         sign = 1.0 if self.t_end >= self.t_start else -1.0
         # Right-continuous in time: at an event time take the later segment forward, the earlier one backward.
         later = (side == "+") == (sign > 0)

@@ -86,7 +86,7 @@ def test_readings_of_the_last_period(hybridsim: Callable) -> None:
         # it turns where v is zero: at events
         assert amplitude == pytest.approx(0.5 * (x.max() - x.min()), rel=1e-12)
     code, _, err = hybridsim("sweep", "dfcs", "F0=22,30", *FINAL, "--after", 40)
-    assert code == 2 and "--after cannot be combined with measures of runs" in err
+    assert code == 2 and "--after cannot be combined with measures of a whole run" in err
 
 
 def test_json_lists_expressions_and_ratios(hybridsim: Callable) -> None:
@@ -130,7 +130,7 @@ def test_a_point_that_fails_is_told_and_only_all_of_them_are_a_failure(hybridsim
         (["F0=1,,2"], "F0"),
         (["F0=1", "F0=2"], "twice"),
         (["F0=1", "--over", "N"], "--over: the sweep does not vary 'N'"),
-        (["F0=1", "--t-end", "3"], "--t-end requires measures of runs"),
+        (["F0=1", "--t-end", "3"], "--t-end requires a measure of a whole run"),
         (["F0=1", "--measure", "amplitude.y"], "amplitude.x"),
         (["F0=1,2", "N=1", "--list", *FINAL], "different lengths"),
         (["omega=300,400", *FINAL], "--t-end 2T depends on the swept parameter omega"),

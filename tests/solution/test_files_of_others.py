@@ -104,7 +104,7 @@ def test_a_place_for_rows_that_are_not_there(
     header, arrays = parts(saved("taylor"))
     arrays["checkpoint/place"] = np.array(place, dtype=float)
     (tmp_path / "r.hsol").write_bytes(sealed(header, arrays))
-    with pytest.raises(hs.UsageError, match="its file is damaged in the numbers of rows"):
+    with pytest.raises(hs.UsageError, match="its file is damaged: the numbers of rows"):
         hs.load_solution(tmp_path / "r.hsol").resume(0.03)
 
 

@@ -72,7 +72,7 @@ def add_to(commands: Any) -> None:
         action="store_true",
         help="combine the k-th values of all parameters, instead of all combinations",
     )
-    options.add(parser, "--t-end", "TIME", "end time of each run, for measures of runs")
+    options.add(parser, "--t-end", "TIME", "end time of each run, for measures of a whole run")
     options.add(
         parser,
         "--after",
@@ -126,7 +126,9 @@ def execute(args: argparse.Namespace, session: Session) -> int:
                 remedy="remove --after, or choose measures of one period",
             )
     elif args.t_end is not None:
-        raise UsageError("--t-end requires measures of runs", remedy="remove --t-end or add --measure final")
+        raise UsageError(
+            "--t-end requires a measure of a whole run", remedy="remove --t-end or add --measure final"
+        )
 
     if args.after is not None:
         settings["after"] = args.after

@@ -104,7 +104,7 @@ class BlockList(Sequence[Item]):
         if (
             blocks and count and not isinstance(blocks[-1], list)
         ):  # a run can continue only at the end of a block of arrays
-            raise damaged("the number of stored segments or events")
+            raise damaged("the number of stored segments or events is wrong")
         if blocks and isinstance(blocks[-1], list):
             last = self._loose()
             last.extend(blocks[-1][: len(blocks[-1]) - count])

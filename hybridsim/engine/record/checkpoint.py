@@ -38,9 +38,9 @@ class Checkpoint:
     occurrences: int = 0  # events recorded since, which are recorded again
 
 
-def damaged(what: str) -> UsageError:
+def damaged(fault: str) -> UsageError:
     """Return the error for a run that cannot continue because its file is damaged."""
     return UsageError(
-        f"the run cannot be resumed: its file is damaged in {what}",
+        f"the run cannot be resumed, because its file is damaged: {fault}",
         remedy="start a new run from sol.y[:, -1]",
     )

@@ -145,10 +145,10 @@ class CompiledLoop:
             self.kernels.place = place
             return
         if not (place.shape == (3,) and ((place >= 0.0) & (place <= max(_CALL_DOUBLES, self.steps))).all()):
-            raise damaged("the numbers of rows, segments and steps")
+            raise damaged("the numbers of rows, segments and steps are out of range")
         rows, segments, steps = (int(number) for number in place)
         if not (1 <= steps <= self.steps and rows <= steps and segments <= MAX_SEGMENTS + 1):
-            raise damaged("the numbers of rows, segments and steps")
+            raise damaged("the numbers of rows, segments and steps are out of range")
         if steps != self.steps:
             self.steps = steps
             self.renew()

@@ -261,7 +261,7 @@ class ModeLoop:
         """Restore a checkpoint, and return the first step size."""
         arrays = checkpoint.arrays
         if "step_size" not in arrays:  # from a method with fixed steps
-            raise damaged("the checkpoint, which has no step size")
+            raise damaged("the checkpoint has no step size")
         self.origin = self.adopted = checkpoint.instant
         if checkpoint.settled is not None:
             self.timetable.mark_done(checkpoint.settled)

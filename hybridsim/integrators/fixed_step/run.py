@@ -148,7 +148,7 @@ class FixedStepRun:
 
     def _go_on_from(self, checkpoint: Checkpoint) -> None:
         if not checkpoint.arrays.keys() >= {*_STATE, "scale"}:
-            raise damaged("the position at which the run continues")
+            raise damaged("the checkpoint is incomplete")
         self.origin = checkpoint.instant
         if checkpoint.settled is not None:
             self.timetable.mark_done(checkpoint.settled)

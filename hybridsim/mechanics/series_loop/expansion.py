@@ -124,7 +124,7 @@ def _fill_registers(arrays: Any, laws: Any, state: Any, scratch: Any, nc: int, o
 
 @kernel
 def constants(arrays: Any, laws: Any, scratch: Any, t: int, last: int, orders: int) -> int:
-    """Store the constants of some lanes in the registers of an instruction tape; return the end of the registers."""
+    """Store the constants of some contacts in the registers of an instruction tape; return the end of the registers."""
     first, at, block = scratch.lane_ptr[t], scratch.place[t], laws.registers[t] * orders * WIDTH
     count, rows = last - first, laws.constant_rows
     end = at + whole_vectors(count) // WIDTH * block

@@ -142,7 +142,7 @@ def _algebraic_loop(fault: CyclicDependency) -> ExpressionError:
 
 
 def _over_modes(exprs: list[Expression]) -> Expression:
-    """Return an expression with the dependencies that it has in any of the modes."""
+    """Return an expression that has the dependencies of several expressions together."""
     first = exprs[0]
     return Expression(first.text, frozenset().union(*(expr.names for expr in exprs)), first.place, first.tree)
 

@@ -41,7 +41,7 @@ def refuse_readers(model: Any, parts: Mapping[str, Any], quantizers: Mapping[str
 
 
 def _deciding(model: Any, parts: Mapping[str, Any]) -> Iterator[tuple[str, Expression]]:
-    """Yield the expressions that are read at events, each with its place in words."""
+    """Yield the expressions that are read at events, each with a text that names its place."""
     for component in parts["components"]:
         what = f"component {component.name}"
         choices = [component.limit] if component.limit else []

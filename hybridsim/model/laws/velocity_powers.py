@@ -73,7 +73,7 @@ def velocity_powers(model: Model) -> tuple[VelocityPower, ...]:
 
 
 def _as_written(power: VelocityPower, contact: Contact, meanings: Meanings) -> VelocityPower:
-    """Return a power of a slip force with the text and the place that it has in the law of the contact."""
+    """Return a power with the text and the place that it has in the friction law of its contact."""
     law, speeds = contact.law, (contact.velocity, substitute(parse(f"-{SPEED}"), {SPEED: contact.velocity}))
     values = {name: value.tree for name, value in contact.values().items()}
     parts = {"slip": law.slip, "slip_backward": law.slip_backward} | {

@@ -31,7 +31,7 @@ def is_continuous(meanings: Meanings, border: ast.expr, body: ast.expr, orelse: 
 
 
 def _solved(border: ast.expr) -> Iterator[dict[str, ast.expr]]:
-    """Yield solutions of border = 0 for each name in which the border is linear."""
+    """Solve border = 0 for each name in which `border` is linear, and yield the solutions."""
     p = difference(border, ast.Constant(0))
     for name in sorted({factor for monomial in p for factor, _ in monomial}):
         if not is_name(name):

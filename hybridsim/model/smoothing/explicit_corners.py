@@ -163,7 +163,7 @@ class _Smoothing:
             yield from (guard.expr.tree for mode in component.modes for guard in mode.guards)
 
     def _crooked(self, result: Model) -> list[Family]:
-        """Return the families of jumps that enter the rates nonlinearly."""
+        """Return the keys of jumps that enter the rates nonlinearly."""
         jumps = {family: jump for family, jump in self.work.jumps.items() if not jump.is_timed}
         carried = {name: {name} for name in self.meanings.forced}
         for jump in jumps.values():

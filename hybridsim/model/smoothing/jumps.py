@@ -112,7 +112,7 @@ class Borders:
         return not any(names_of(rate) & self._switched or _jumps(rate) for rate in rates)
 
     def conflict(self, argument: ast.expr, jumps: Iterable[Jump]) -> str:
-        """Return the reason why a border conflicts with other surfaces and jumps, or an empty text."""
+        """Return the reason why an argument conflicts with other surfaces and jumps, or an empty text."""
         if self.is_timed(argument) or self.is_only_passed(argument):
             return ""
         others = [*self._surfaces, *(jump.argument for jump in jumps if not jump.is_timed)]
@@ -134,7 +134,7 @@ class Borders:
         )
 
     def _slopes(self, argument: ast.expr) -> list[Fraction] | None:
-        """Return the coefficients of the states in a border, or None if the border is not linear."""
+        """Return the coefficients of the states in an argument, or None if the argument is not linear."""
         slopes = dict.fromkeys(sorted(self._moving), Fraction(0))
         for monomial, coefficient in polynomial(self._meanings.written_out(argument)).items():
             moved = [factor for factor in monomial if not self._moving.isdisjoint(NAME.findall(factor[0]))]
@@ -148,7 +148,7 @@ class Borders:
         return list(slopes.values())
 
     def is_timed(self, argument: ast.expr) -> bool:
-        """Return whether a border depends on time only."""
+        """Return whether an argument depends on time only."""
         return not names_of(self._meanings.written_out(argument)) & self._moving
 
 
@@ -173,7 +173,7 @@ def _rank(rows: list[list[Fraction]]) -> int:
 def apart_by(
     meanings: Meanings, first: ast.expr, second: ast.expr
 ) -> tuple[Polynomial, Polynomial, Polynomial]:
-    """Return n, d and the constant g = n*first - d*second for parallel borders, otherwise empty polynomials.
+    """Return n, d and the constant g = n*first - d*second for parallel expressions, otherwise empty polynomials.
 
     n and d are numbers times products of parameters, n / d the ratio of the slopes of the second to those of the first.
     """
@@ -209,7 +209,7 @@ def _times(one: Monomial, other: Monomial, power: int = 1) -> Monomial:
 
 
 def product_of_signs(meanings: Meanings, first: ast.expr, second: ast.expr) -> ast.expr | None:
-    """Return sign(first)*sign(second) as a linear function of both signs, or None if the borders are not parallel.
+    """Return sign(first)*sign(second) as a linear function of both signs, or None if the arguments are not parallel.
 
     With n, d and g of `apart_by` and n', d', g' their signs, the product is n' d' - d' g' u + n' g' w. Where n or d has
     the value 0, one border is constant, and has the sign that this gives it.

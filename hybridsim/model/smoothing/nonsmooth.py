@@ -141,7 +141,7 @@ Sides = tuple[ast.expr, ast.expr, ast.expr, ast.expr]
 
 
 def sides_of(node: ast.expr) -> Sides | None:
-    """Return the argument and the two sides of a non-smooth function, or None for other nodes."""
+    """Return the argument and the two branches of a non-smooth function, or None for other nodes."""
     match node:
         case ast.Call(func=ast.Name(id="abs"), args=[u]):
             return u, u, ast.UnaryOp(ast.USub(), u), u

@@ -176,7 +176,7 @@ class Rewriting(RewritingState):
         return replace(here, untouched=here.untouched or "it is in a root or a fractional power")
 
     def _side(self, node: ast.expr, parts: Sides, here: Here) -> ast.expr:
-        """Return the replacement of a non-smooth function: one of its sides, or a variable."""
+        """Return the replacement of a non-smooth function: one of its branches, or a variable."""
         argument, above, below, on_border = parts
         if here.signs and not self.is_smooth(argument):
             argument = resolved(self.meanings, argument, here.signs)
@@ -257,7 +257,7 @@ class Rewriting(RewritingState):
     def _pair(
         self, above: ast.expr, below: ast.expr, family: Family, sign: int, here: Here
     ) -> tuple[ast.expr, ast.expr]:
-        """Rewrite both sides of a non-smooth function; on each side the sign of its argument is known.
+        """Rewrite both branches of a non-smooth function; in each branch the sign of the argument is known.
 
         Signs without influence are dropped, because corners nested twenty times would otherwise be visited a million
         times.
@@ -272,11 +272,11 @@ class Rewriting(RewritingState):
         return first, second
 
     def _is_met(self, family: Family, node: ast.expr) -> bool:
-        """Return whether a tree contains a corner at a given border, or any jump."""
+        """Return whether a tree contains a jump, or a corner at which a given expression is zero."""
         return None in (met := self._borders_in(node)) or family in met
 
     def _borders_in(self, node: ast.expr) -> frozenset[Family | None]:
-        """Return the borders of the corners in a tree, with None for each jump."""
+        """Return the arguments of the corners in a tree, and None for each jump."""
         if id(node) not in self._met:
             found: set[Family | None] = set()
             is_jump = isinstance(node, ast.IfExp | ast.Compare | ast.BoolOp)
@@ -304,7 +304,7 @@ class Rewriting(RewritingState):
         return bool(may_be_timed) and self.borders.is_timed(argument) and not self.borders.refusal(argument)
 
     def _step(self, family: Family, argument: ast.expr) -> TimeStep | None:
-        """Return the step signal of a condition on time, or None if its times cannot be computed."""
+        """Return the step signal of a condition on time, or None if the times of its changes cannot be computed."""
         if family not in self.steps:
             tree = self.meanings.written_out(argument)
             found = step_of(f"{STEP}{len(self.steps) + 1}", tree, self._parameters, write(argument))
@@ -315,7 +315,7 @@ class Rewriting(RewritingState):
         return self.steps[family][0]
 
     def timed_by_form(self) -> set[Family]:
-        """Return the families of jumps and corners whose sign depends on time alone and can be given by a signal."""
+        """Return the keys of jumps and corners whose sign depends on time alone and can be given by a signal."""
         found = {family: one.argument for family, one in self.jumps.items()}
         found |= {family: one.argument for family, one in self.corners.items()}
         return {f for f, border in found.items() if self.borders.is_timed(border) and self._step(f, border)}
@@ -331,7 +331,7 @@ class Rewriting(RewritingState):
         return with_names(_EITHER, names)
 
     def _jump(self, node: ast.expr, parts: Sides, family: Family, sign: int, here: Here) -> ast.expr:
-        """Return the replacement of a non-smooth function that jumps at its border."""
+        """Return the replacement of a non-smooth function that jumps where its argument is zero."""
         argument, above, below, _ = parts
         if self.borders.is_timed(argument):
             reason = (
@@ -358,7 +358,7 @@ class Rewriting(RewritingState):
     def _stairs(
         self, jump: Jump, argument: ast.expr, nested: ast.expr, other: ast.expr, way: int, here: Here
     ) -> ast.expr | None:
-        """Return nested jumps between constants as a sum of signs if their borders are parallel, otherwise None.
+        """Return nested jumps between constants as a sum of signs, or None if their arguments are not parallel.
 
         `way` is the side (1 or -1) of the first border on which the second border is.
         """

@@ -113,13 +113,13 @@ class RewritingState:
         return reason or self.refusal or self.refused.get(family, "") or self._border(family, argument)
 
     def _border(self, family: Family, argument: ast.expr) -> str:
-        """Return the reason why a border cannot become a switching surface, or an empty text."""
+        """Return the reason why an argument cannot become a switching surface, or an empty text."""
         if family in self.jumps:
             return ""
         return self.borders.refusal(argument) or self.borders.conflict(argument, self.jumps.values())
 
     def agrees(self, node: ast.expr, parts: Sides) -> bool:
-        """Return whether the two sides of a non-smooth function are equal at its border."""
+        """Return whether a non-smooth function is continuous where its argument is zero."""
         argument, above, below, _ = parts
         if isinstance(node, ast.IfExp):
             family, sign = self.meanings.family(argument)
@@ -141,7 +141,7 @@ class RewritingState:
 
 
 def resolved(meanings: Meanings, node: ast.expr, signs: Mapping[Family, int]) -> ast.expr:
-    """Return a tree with definitions inserted and with the sides selected by known signs."""
+    """Return a tree with definitions inserted and with the branches selected by known signs."""
 
     def side(part: ast.expr) -> ast.expr:
         sides = sides_of(part)

@@ -119,7 +119,7 @@ class Inference:
         return product.without_angles() if turns else product  # 2*pi*f is in rad/s
 
     def _has_parameter(self, node: ast.expr) -> bool:
-        """Return whether a product contains a parameter, or its power, whose unit is known and not 1."""
+        """Return whether a product contains a parameter, or a power of a parameter, with a known unit other than 1."""
         match node:
             case ast.Name(id=name):
                 return name in self.parameters and self.units.get(name, ONE) != ONE

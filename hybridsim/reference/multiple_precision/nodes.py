@@ -203,7 +203,7 @@ class Pointwise(Node):
 
 
 def in_order(targets: Sequence[Node]) -> list[Node]:
-    """Return all nodes on which some nodes depend, sorted so that operands come first.
+    """Return all nodes on which the given nodes depend, sorted so that operands come first.
 
     A cycle is an error, unless it passes a node of which only lower coefficients are used.
     """

@@ -77,7 +77,7 @@ class Run:
     # -- steps ----------------------------------------------------------------------------------------------
 
     def _step(self) -> None:
-        """Make one step up to its end or to the first event in it."""
+        """Make one step, which ends at the first event in it if there is one."""
         point, expansion = self.now.point, self.now.expansion
         appointment = self.appointments.next(point.t)
         bound = appointment.t - point.t
@@ -145,7 +145,7 @@ class Run:
         return True
 
     def _changes(self, expansion: Expansion, quantity: QuantitySeries, h: Number) -> tuple[int, list[Number]]:
-        """Return the side just after the start of a step, and the times in (0, h] at which it changes."""
+        """Return the sign of a quantity just after the start of a step, and the times in (0, h] of its sign changes."""
         side, order = expansion.side_after(quantity)
         return side, sign_changes(quantity.c[order:], h, self.precision) if side else []
 

@@ -139,7 +139,7 @@ def _readable(text: str, component: str) -> str:
 
 
 def candidate(system: System, decision: Decision, look: Look) -> Candidate:
-    """Return one combination of modes that a decision judged, with the values of its guards."""
+    """Return one combination of modes that was examined at an event, with the values of its guards."""
     guards = [g for c in look.components for g in system.automata[c].guards[look.z[c]]]
     shown = tuple(views(system, look.at, look.z, guards, look.decreed))
     modes = {system.automata[c].name: system.automata[c].modes[look.z[c]] for c in look.components}

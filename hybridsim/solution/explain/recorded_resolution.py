@@ -15,7 +15,7 @@ from hybridsim.engine.events.resolve import EventResolution
 
 @dataclass(frozen=True)
 class Look:
-    """One combination of modes that a decision judged.
+    """One combination of modes that was examined when modes were chosen.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ class Look:
 
 @dataclass
 class Decision:
-    """A decision on several components: the judged combinations, the chosen modes, and the changes.
+    """A choice of modes for several components: the examined combinations, the chosen modes and the changes.
 
     Parameters
     ----------

@@ -63,7 +63,7 @@ def _name(one: Occurrence) -> str:
 
 
 def _changed(system: System, occurrence: Occurrence, z: np.ndarray) -> str:
-    """Describe a corner that changes its side, or a table that changes its piece."""
+    """Describe a corner whose argument changes its sign, or a table that enters its next piece."""
     name, component = _quoted(occurrence.component), _component(system, occurrence.component)
     if component.modes[0].name == _FIRST_PIECE:
         return f"table {name} goes from piece {occurrence.source} to piece {occurrence.target} here"

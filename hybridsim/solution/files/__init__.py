@@ -1,4 +1,4 @@
-"""This package saves solutions to files and loads them: archives that are checked, and tables.
+"""This package saves solutions as archives and tables, and loads archives after checks.
 
 Start with `archive`.
 """

@@ -176,7 +176,7 @@ def test_a_rest() -> None:
 
 def test_a_rest_of_a_family_is_refused() -> None:
     """A block on dry friction may rest at any place of an interval: its multiplier is 1."""
-    with pytest.raises(hs.UsageError, match="multiplier 1: it is in a family"):
+    with pytest.raises(hs.UsageError, match="multiplier 1, which is too close to 1"):
         hs.steady_state("free-decay").sensitivities(["mu"])
 
 

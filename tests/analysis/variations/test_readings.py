@@ -266,7 +266,7 @@ def test_kinks_and_jumps_that_are_no_events() -> None:
 def test_readings_that_do_not_exist_are_refused() -> None:
     """Unknown readings, quantities and spans."""
     found = bounced()
-    with pytest.raises(hs.UsageError, match="no reading 'maximun'"):
+    with pytest.raises(hs.UsageError, match="the reading 'maximun' does not exist"):
         found.of("maximun", "h")
     with pytest.raises(hs.UsageError, match="no quantity 'x'"):
         found.of("mean", "x")
