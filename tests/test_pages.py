@@ -140,7 +140,7 @@ def test_a_long_run_goes_on(tmp_path: Path) -> None:
     done = fresh.run(code, folder=tmp_path, is_strict=True)
     assert done.returncode == 0, done.stderr
     status, message = done.stdout.splitlines()
-    assert status == "limit" and "500 were allowed" in message
+    assert status == "limit" and "500 are allowed" in message
 
 
 def test_the_event_trace_is_as_shown(tmp_path: Path) -> None:

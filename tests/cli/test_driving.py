@@ -15,5 +15,5 @@ def test_check_refuses_a_force_that_drives(tmp_path: Path) -> None:
     path = tmp_path / "slip.toml"
     path.write_text(text)
     model = hs.load(path)
-    with pytest.raises(hs.ModelError, match="acts along its relative velocity"):
+    with pytest.raises(hs.ModelError, match="acts along the relative velocity"):
         describe(model)

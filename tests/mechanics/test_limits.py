@@ -14,7 +14,7 @@ def test_a_forcing_that_is_far_too_fast_ends_at_the_limit_of_seconds() -> None:
     sol = hs.simulate(oscillator(1e9), (0, 10), limits={"seconds": 0.5})
     assert sol.status == "limit"
     assert not sol.success
-    assert "0.5 were allowed" in sol.message
+    assert "at most 0.5 are allowed" in sol.message
     assert 0.0 < sol.t[-1] < 10.0
 
 

@@ -148,7 +148,7 @@ def test_a_contact_that_drives_its_velocity_is_refused_after_good_runs(
     for changes in ({}, good, {"a": 2.0}):
         assert hs.simulate(model, (0, 1), params=changes).success
     for _ in range(2):
-        with pytest.raises(hs.ModelError, match="acts along its relative velocity"):
+        with pytest.raises(hs.ModelError, match="acts along the relative velocity"):
             hs.simulate(model, (0, 1), params=bad)
 
 

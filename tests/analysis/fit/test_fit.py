@@ -181,7 +181,7 @@ def test_bounds_may_be_narrow(width: float) -> None:
 
 def test_two_columns_of_one_quantity_are_refused() -> None:
     t = np.linspace(0.0, 2.0, 30)
-    with pytest.raises(hs.UsageError, match="`quantities` has 2 columns of x"):
+    with pytest.raises(hs.UsageError, match="`quantities` assigns 2 columns to x"):
         hs.Record({"t": t, "left": t, "right": t}, {"left": "x", "right": "x"})
 
 

@@ -178,7 +178,7 @@ def test_points_that_fail_leave_a_status_and_all_the_others() -> None:
     assert "normal load cannot be -1" in found.status[1]
     wrong = hs.sweep(hs.load("dfcs").with_(omega=400.0), {"m": [0.2, -0.2, 0.0]}, ["amplitude.x"], after=3)
     assert wrong.failed.tolist() == [False, True, True]
-    assert "acts along its relative velocity" in wrong.status[1]
+    assert "acts along the relative velocity" in wrong.status[1]
 
 
 def test_what_has_no_last_period_is_refused() -> None:

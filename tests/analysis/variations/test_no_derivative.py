@@ -72,7 +72,7 @@ def test_a_parameter_at_a_root_or_kink_is_refused_by_name(formula: str) -> None:
         run({"x": (formula, "1")}, a=0.0, b=0.0),
         run({"x": (1.0, "c*x")}, a=0.0, b=0.0, c=formula),
     ):
-        with pytest.raises(hs.UsageError, match=r"no derivative by a|exactly at its zero"):
+        with pytest.raises(hs.UsageError, match=r"no derivative (by|with respect to) a|exactly at its zero"):
             found = hs.sensitivities(sol, ["a"])
             assert np.isnan(found.by_parameter).all(), found
             raise hs.UsageError(found.warnings[0])

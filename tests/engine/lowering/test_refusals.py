@@ -43,6 +43,6 @@ def test_two_contacts_on_one_velocity() -> None:
 
 def test_a_force_that_drives_its_contact() -> None:
     text = STATES.format(force="f - x") + CONTACT.format(name="f", velocity="v")
-    with pytest.raises(ModelError, match="acts along its relative velocity") as caught:
+    with pytest.raises(ModelError, match="acts along the relative velocity") as caught:
         hs.simulate(hs.Model.from_toml(text, path="m.toml"), (0, 1))
     assert str(caught.value).startswith("m.toml:6: ")

@@ -158,4 +158,4 @@ def test_mode_remarks_name_the_component() -> None:
     contact = hs.Contact("f", "v", "1", "coulomb", {"mu": 0.5})
     account = accounts(moving("-x - f - abs(v)", contacts=[contact]))["abs(v)"]
     assert (account.became, account.where) == (MODE, ("state v",))
-    assert account.remark == "the modes of f determine the side"
+    assert account.remark == "the mode of f selects the branch"
