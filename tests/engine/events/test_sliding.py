@@ -388,7 +388,7 @@ guards.due = {{ expr = "2 - t", then = "b" }}
 der = {{ {change} }}
 """
     with pytest.raises(
-        hs.ModelError, match=r"change the derivative of \w, on which the rate of the switching function"
+        hs.ModelError, match=r"depends on \w, but modes of \w+ change the derivative of \w"
     ):
         run(text, 6.0, integrator="exact")
     through_a_variable = text.replace('"-2*u"', '"-2*u + w"').replace(
