@@ -53,7 +53,7 @@ def refuse_plain_time(system: System, period: float | None) -> None:
     for what, tree in _with_time(model):
         if period is None:
             raise UsageError(
-                f"{what} contains t outside of sines and cosines: the period of model {model.name} is unknown",
+                f"{what} contains t outside of sines and cosines, so the period of model {model.name} is unknown",
                 remedy="if the motion is periodic, pass `period`",
             )
         if meanings.depended_on(names_of(tree)) & discrete:
@@ -72,7 +72,7 @@ def refuse_plain_time(system: System, period: float | None) -> None:
                 )
     if period is None:  # t in a guard or a reset
         raise UsageError(
-            f"model {model.name} contains t outside of sines and cosines: its period is unknown",
+            f"model {model.name} contains t outside of sines and cosines, so the period of its forcing is unknown",
             remedy="if the motion is periodic, pass `period`",
         )
 

@@ -387,9 +387,7 @@ guards.due = {{ expr = "2 - t", then = "b" }}
 [components.c.modes.b]
 der = {{ {change} }}
 """
-    with pytest.raises(
-        hs.ModelError, match=r"depends on \w, but modes of \w+ change the derivative of \w"
-    ):
+    with pytest.raises(hs.ModelError, match=r"depends on \w, but modes of \w+ change the derivative of \w"):
         run(text, 6.0, integrator="exact")
     through_a_variable = text.replace('"-2*u"', '"-2*u + w"').replace(
         "initial = true", 'initial = true\nset = { w = "0" }'
