@@ -61,7 +61,7 @@ def _are_same(one: Read | NotLinear | None, other: Read | NotLinear | None) -> b
 
 
 class _Changes:
-    """Reads modes that differ in a few components from the first modes, for which most registers stay as they are."""
+    """Computes linear forms of modes that differ little from the first modes, by new values of few registers."""
 
     def __init__(self, system: System, p: Sequence[float] | None) -> None:
         self.system = system
@@ -101,7 +101,7 @@ class NoMode:
         self.guards: dict[int, Form] = {}
 
     def monomials(self) -> set[Monomial]:
-        """Return no functions of time, because there is no motion."""
+        """Return an empty set, because a mode without motion needs no functions of time."""
         return set()
 
 

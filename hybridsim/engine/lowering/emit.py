@@ -43,7 +43,7 @@ class Emitter:
         self._slopes: dict[tuple[Any, Any], Any] = {}  # by pattern and numbered name
 
     def _inputs(self) -> dict[str, str]:
-        """Return the place from which each external name of the program is read."""
+        """Return the code that reads each external name of the program, such as `x[0]`."""
         program, layout = self.program, self.program.layout
         where = {"s": "t", "origin": f"p[{layout.origin_at}]", "pin": f"p[{layout.pin_at}]"}
         where |= {user(q.name): f"p[{i}]" for i, q in enumerate(program.model.parameters)}
@@ -122,7 +122,7 @@ class Emitter:
         return [line for item in items for line in self._item(item)]
 
     def _item(self, item: Item) -> list[str]:
-        """Return the lines of a program item, which several functions contain."""
+        """Return the lines of code of a program item, which are written once for all functions."""
         if id(item) not in self._lines:  # the program keeps its items
             self._lines[id(item)] = self._new_lines(item)
         return self._lines[id(item)]
@@ -197,7 +197,7 @@ class Emitter:
         return found
 
     def _slope(self, e: Any, symbol: Any) -> Any:
-        """Return the derivative of an expression, which copies of a part share."""
+        """Return the derivative of an expression; expressions of the same pattern share one derivative."""
         pattern, numbered = pattern_of(e)
         key = pattern, numbered[symbol]
         if key not in self._slopes:
@@ -205,7 +205,7 @@ class Emitter:
         return self._slopes[key].xreplace({place: s for s, place in numbered.items()})
 
     def _choose(self) -> str:
-        """Return the text of the function that chooses the branch of a guard."""
+        """Return the text of the function that finds the first true condition of a guard."""
         count = len(self.program.components)
         lines = ["def choose(t, x, p, z, out):", "    out[0] = -1.0"]
         for (c, m, g), conditions in self.program.conditions.items():

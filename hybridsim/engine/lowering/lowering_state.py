@@ -120,7 +120,7 @@ class LoweringState:
         return e
 
     def gradient(self, e: Any) -> dict[int, Any]:
-        """Return the derivatives of an expression by the states that occur in it, by their numbers, in order."""
+        """Return the derivatives of an expression with respect to the states in it, by number, in order."""
         if e not in self._gradients:
             numbers = sorted(self._number[x] for x in e.free_symbols & self._number.keys())
             self._gradients[e] = {i: self.sp.diff(e, self.states[i]) for i in numbers}
@@ -164,7 +164,7 @@ class LoweringState:
 
 
 def pattern_of(e: Any, moving: Container[Any] = ()) -> tuple[Any, dict[Any, Any]]:
-    """Return an expression with numbered names, and the numbered name of each symbol.
+    """Return an expression with numbered names, and a dict of the numbered name of each symbol.
 
     Copies of a part have the same pattern, and so share symbolic results. The numbers are in the order of the names, on
     which the order of terms depends. moving : symbols that get another kind of name.

@@ -45,7 +45,7 @@ class Switch:
 
     @cached_property
     def used(self) -> frozenset[str]:
-        """Return the names that the item reads in any mode and does not set itself."""
+        """Return the names whose values the item needs in any mode."""
         names: set[str] = set()
         for branch in self.branches:
             own: set[str] = set()

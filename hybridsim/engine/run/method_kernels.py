@@ -28,7 +28,7 @@ STEPS_PER_LOOK = 500  # a method with `is_looked_at` is examined for stiffness a
 
 
 class StepRows(NamedTuple):
-    """The rows of the stored steps, for methods whose dense output is a polynomial in each step."""
+    """The stored steps of methods whose dense output is a polynomial in each step."""
 
     steps: np.ndarray  # start and length (S, 2) in local time
     series: (
@@ -37,7 +37,7 @@ class StepRows(NamedTuple):
 
 
 class MethodKernels(ABC):
-    """The parts that a method adds to the compiled event loop of one run; `longest` limits the segments.
+    """The compiled functions and data of one method for the event loop of one run.
 
     ``segment(start, model, call, state, work, own, rows)`` is an `inlined` kernel from `SegmentStart` to `SegmentEnd`.
     `loop` is a plain function that passes it to `event_loop`; both are compiled together. The other arguments of a
@@ -87,7 +87,7 @@ class MethodKernels(ABC):
 
     @abstractmethod
     def arrays(self) -> Any:
-        """Return new packed arrays of the segment kernel for one call."""
+        """Return new arrays for one call of the compiled loop."""
 
     @abstractmethod
     def fields(self) -> Sequence[tuple[Any, tuple[int, ...]]]:
@@ -123,7 +123,7 @@ class MethodKernels(ABC):
         return self.with_tapes(own, tapes)
 
     def with_tapes(self, own: Any, tapes: Tapes) -> Any:
-        """Return the arrays for a call that begins or goes on with the given instruction tapes."""
+        """Return the arrays of a call, adapted to the given instruction tapes."""
         return own
 
     def end(self, own: Any, tapes: Tapes, lin: Any) -> Any:

@@ -48,7 +48,7 @@ class OptimisedTape:
 
 
 def separate_registers(tape: dict[str, Any]) -> dict[int, int]:
-    """Return separate registers for values that are constant in some modes and vary in other modes.
+    """Return additional registers for values that are constant in some modes and vary in others.
 
     A compiled loop keeps its registers from mode to mode and writes only the leading coefficient of a
     constant. Without separate registers, the higher coefficients of another mode would remain.
@@ -191,13 +191,13 @@ def _registers(op: int) -> int:
 
 @inlined
 def _is_paired(op: int) -> bool:
-    """Return whether an operation has a companion in the next register."""
+    """Return whether an operation has two results, such as sine and cosine."""
     return op == ops.SINCOS or op == ops.SINHCOSH or op == ops.TANGENT
 
 
 @inlined
 def _kind_of(op: int, first: int, second: int, third: int) -> int:
-    """Return the dependence of a result on time; an operand that does not exist has the kind of the first one."""
+    """Return how the result of an operation depends on time, from three operands."""
     highest = max(first, second, third)
     if highest != LINEAR:
         return highest
@@ -207,7 +207,7 @@ def _kind_of(op: int, first: int, second: int, third: int) -> int:
 
 
 def _kind(op: int, kinds: list[int]) -> int:
-    """Return the dependence of a result on time from the kinds of its operands."""
+    """Return how the result of an operation depends on time: constant, linear, or neither."""
     return _kind_of(op, kinds[0], *(kinds[1:3] + kinds[:1] * 2)[:2])
 
 

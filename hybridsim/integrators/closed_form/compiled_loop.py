@@ -101,7 +101,7 @@ class ClosedFormKernels(MethodKernels):
         return own
 
     def with_tapes(self, own: Any, tapes: Tapes) -> Any:
-        """Return the arrays with guesses for all combinations of modes; added ones have no guess."""
+        """Return the arrays with guesses of zeros for all combinations of modes; new combinations have no guess."""
         former, known = own, len(own.hints)
         if known < max(len(self.lin.counts), len(self.hints)):
             own = self.arrays()

@@ -104,7 +104,7 @@ class TaylorKernels(MethodKernels):
         return self.with_tapes(own, tapes)
 
     def with_tapes(self, own: Any, tapes: Tapes) -> Any:
-        """Return the arrays with the rows for high orders and the machine code of the instruction tapes."""
+        """Return the arrays, with the instructions for high orders and the machine code of the instruction tapes."""
         return replaced(own, high=self.high.of(tapes), codes=self.codes.of(tapes))
 
     def end(self, own: Any, tapes: Tapes, lin: Any) -> None:

@@ -1,4 +1,4 @@
-"""Process a known time in a compiled loop: start new pieces of inputs, and reset discrete states.
+"""Process a known time in a compiled loop: update the inputs, and reset discrete states.
 
 The rules are those of `hybridsim.engine.events.resolve`. A known time is ordinary if all guards of the present modes
 are certainly positive just after it. Otherwise nothing is changed, and the general loop resolves it.
@@ -81,7 +81,7 @@ def store_known_times(arrays: Any, known: KnownTimes, resets: np.ndarray) -> Non
 
 @inlined
 def begin_call(ints: Any, pace: Any, work: Any) -> None:
-    """Prepare the counts of a call, which goes on with those of the last call if IS_CONTINUED is set."""
+    """Prepare the counters of a call; they continue from the last call if IS_CONTINUED is set."""
     if ints[IS_CONTINUED] == 0:
         pace[0], pace[1], pace[2], pace[SINCE] = math.inf, math.inf, 0.0, 0.0
         ints[STEPS] = ints[SEGMENTS] = ints[KNOWN] = 0
@@ -99,7 +99,7 @@ def set_origin(place: Any, rates: Any, hi: float, lo: float, p: Any) -> None:
 
 @inlined
 def set_inputs(signals_at: int, starts: Any, hi: float, lo: float, p: Any) -> None:
-    """Set the starts of the inputs' pieces for a segment that starts at a given instant."""
+    """Set the times at which the inputs' intervals start, for a segment that starts at a given instant."""
     for k in range(starts.shape[0]):
         short_loop()
         if starts[k, 0] == starts[k, 0]:
@@ -109,7 +109,7 @@ def set_inputs(signals_at: int, starts: Any, hi: float, lo: float, p: Any) -> No
 
 @inlined
 def errors_at_known_time(model: Any, loop: Any, s: float, steps: int, state: Any, work: Any) -> None:
-    """Write error bounds of the states at a known time, like `hybridsim.engine.run.located.errors_when_due`."""
+    """Compute error bounds of the states at a known time, as `errors_when_due` does in Python."""
     functions, automata, p, z = called_by(work), model.automata, state.p, state.z
     y, out, other, slopes = work.y, work.y_error, work.x_after, work.slopes
     ulp, is_holding = 2.0**-52 * abs(loop.times[0]), False

@@ -94,7 +94,7 @@ class EventScratch(NamedTuple):
 
 @inlined
 def called_by(work: Any) -> Any:
-    """Return the functions of the model for a work space."""
+    """Return the addresses of the model's functions that belong to a work space."""
     f = work.functions
     return Functions(f[0], f[1], f[2], f[3], f[4])
 
@@ -123,7 +123,7 @@ def row_of(tapes: Any, z: Any, work: Any) -> int:
 
 @inlined
 def note_or_restore(counts: Any, is_rejected: bool, work: Any) -> None:
-    """Note the first half of an array in its second half at the start of a segment.
+    """Save the counters in the second half of their array, or restore them if the segment was rejected.
 
     Restore it if the segment is rejected because its event needs modes without an instruction tape. The segment is then
     followed again.

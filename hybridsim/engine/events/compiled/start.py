@@ -142,7 +142,7 @@ def _choose_cluster(
 
 @per_structure
 def surfaces_of(system: System) -> tuple[np.ndarray, ...]:
-    """Return the arrays that `plain_start` reads from the instruction tape of the first modes.
+    """Return the arrays that `plain_start` reads.
 
     These are the constant rows, the rows, the registers of the rates and of the surfaces, and the component of each
     surface.
@@ -195,7 +195,7 @@ class StartScratch:
 
 
 def judged(system: System, call: Callable[[StartScratch], bool]) -> HybridState | None:
-    """Return the state that a call of a kernel leaves in its arrays, or None if the kernel returns False.
+    """Call a kernel that judges the start, and return the resulting state, or None if the kernel returns False.
 
     The call fills the arrays itself. It is made again as long as it lacks the instruction tapes of some modes.
     """

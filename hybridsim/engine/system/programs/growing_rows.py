@@ -17,7 +17,7 @@ class GrowingArray:
         self._memory = np.zeros((0, *shape), dtype=dtype)
 
     def put(self, first: int, rows: Any) -> None:
-        """Write rows behind the first ones."""
+        """Write rows after the first `first` rows."""
         end = first + len(rows)
         if end > len(self._memory):
             memory = np.zeros((2 * end, *self._memory.shape[1:]), dtype=self._memory.dtype)
@@ -26,24 +26,24 @@ class GrowingArray:
         self._memory[first:end] = rows
 
     def up_to(self, count: int) -> np.ndarray:
-        """Return the first rows."""
+        """Return the first `count` rows."""
         return self._memory[:count]
 
 
 class GrowingLists:
-    """Lists of rows, one behind the other in one array, with the start of each list."""
+    """Lists of rows in one array, with the start of each list."""
 
     def __init__(self, shape: tuple[int, ...] = (5,)) -> None:
         self._starts, self._rows = GrowingArray(), GrowingArray(shape)
         self._starts.put(0, [0])
 
     def put(self, k: int, rows: Any) -> None:
-        """Write list number k behind the lists before it."""
+        """Write the list of number k after all earlier lists."""
         first = int(self._starts.up_to(k + 1)[k])
         self._rows.put(first, rows)
         self._starts.put(k + 1, [first + len(rows)])
 
     def up_to(self, count: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return the starts of the first lists, and their rows."""
+        """Return the starts and the rows of the first `count` lists."""
         starts = self._starts.up_to(count + 1)
         return starts, self._rows.up_to(starts[count])

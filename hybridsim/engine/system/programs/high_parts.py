@@ -1,4 +1,4 @@
-"""This module provides the rows for high orders of all combinations of modes, for the kernels of Taylor's method."""
+"""This module stores the instructions for high orders of Taylor series, for all combinations of modes."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ from hybridsim.forks import SharedLock
 
 
 class HighParts(NamedTuple):
-    """The rows for high orders of several combinations of modes (`hybridsim.engine.series.high_orders`)."""
+    """The instructions for high orders of Taylor series, for several combinations of modes."""
 
     start: np.ndarray
     rows: np.ndarray
 
 
 class HighPartsCache:
-    """Caches the rows for high orders, which depend on the model's structure only."""
+    """Caches the instructions for high orders of Taylor series, once for each structure of models."""
 
     def __init__(self, system: System) -> None:
         self.system, self._lists, self._count, self._lock = system, GrowingLists(), 0, SharedLock()
         self._known: tuple[Tapes, HighParts] | None = None
 
     def of(self, tapes: Tapes) -> HighParts:
-        """Return the rows of the given tapes."""
+        """Return the instructions for high orders that belong to the given tapes."""
         known = self._known  # read once, because other threads may replace it
         if known is None or known[0] is not tapes:
             with self._lock:

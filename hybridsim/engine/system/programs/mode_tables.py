@@ -54,7 +54,7 @@ class Automata(NamedTuple):
 
 
 class Tapes(NamedTuple):
-    """The instruction tapes of several combinations of modes, with one row or one slice for each combination."""
+    """The instruction tapes of several combinations of modes, joined in arrays."""
 
     modes: np.ndarray  # modes (K, C)
     hash_slots: np.ndarray  # hash table: `hybridsim.engine.system.programs.modes_index`
@@ -159,7 +159,7 @@ class TapeCache:
         self._compiler.prepare(tapes.modes, tapes.lacked, put)
 
     def _text(self, tape: ModeTape, z: np.ndarray) -> Callable[[], str] | None:
-        """Return a function that writes the code of short series for one combination of modes, or None."""
+        """Return a function that writes code for short Taylor series in one combination of modes, or None."""
         system, rows = self.system, constant_rows(self.system, z)
         if not can_bound(tape, rows):
             return None
@@ -167,13 +167,13 @@ class TapeCache:
         return lambda: bounds_text(tape, rows, constant_sources(system), numbers, system.guard_count)
 
     def with_modes(self, z: np.ndarray) -> Tapes:
-        """Return instruction tapes that include those of a combination of modes."""
+        """Return instruction tapes that include the tape of a given combination of modes."""
         if z.tobytes() not in self._numbers:
             self.rows_of(z[None])
         return self.tapes
 
     def with_complete_set(self) -> Tapes:
-        """Return the tapes so far, with those of all combinations of modes if these are few.
+        """Return the tapes of all combinations of modes if there are few, otherwise the tapes so far.
 
         The tables of linear modes of few combinations are made at once.
         """
