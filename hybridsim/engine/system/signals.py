@@ -1,4 +1,4 @@
-"""This module evaluates inputs at run time: the current piece of a table, wave or chirp."""
+"""This module evaluates inputs at run time: the present interval of a table, wave or chirp."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _SHAPES = {
 
 
 class Signal:
-    """One input with its parameter values: its pieces and knots."""
+    """One input with its parameter values: its knots, and its coefficients between the knots."""
 
     def __init__(self, declared: Input, values: Mapping[str, float]) -> None:
         self.kind = declared.kind
@@ -40,7 +40,7 @@ class Signal:
             self.corners = square if self.shape == "square" else _SHAPES[str(self.shape)]
 
     def piece(self, origin: Instant, forward: bool) -> tuple[float, ...]:
-        """Return the six numbers of the piece after an instant; for a run backward in time, of the piece before it."""
+        """Return the six numbers that describe an input just after an instant, or just before it in a backward run."""
         if self.kind == "table":
             return self._table_piece(origin, forward)
         if self.kind == "step":
@@ -80,7 +80,7 @@ class Signal:
         return not (self.kind == "chirp" or self.shape == "sine")
 
     def ahead(self, after: Instant, most: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return at most `most` next knots (m, 2), and the pieces (m + 1, 6) before each knot and after the last.
+        """Return at most `most` next knots (m, 2) of an input, and its coefficients (m + 1, 6) between the knots.
 
         A piece is given by four coefficients and the instant from which its time is counted, or nan for a constant.
         """
@@ -104,7 +104,7 @@ class Signal:
         return self._rows[first + 1 : first + most + 1, 4:], rows
 
     def _repeated(self, after: Instant, most: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return the knots (m, 2) of a wave or step, some of them before `after`, and the piece (m, 6) at each knot."""
+        """Return the knots (m, 2) of a wave or step around an instant, and its coefficients (m, 6) after each knot."""
         number = self._number
         if self.kind == "step":
             corners = [(time, (value, 0.0, 0.0, 0.0)) for time, value in self._turns]

@@ -65,7 +65,7 @@ class Automaton:
 
     @property
     def has_surface(self) -> bool:
-        """Return whether the component has a switching surface, at which the admissible mode is taken."""
+        """Return whether the component has a surface, and a mode that holds it."""
         return self.hold >= 0
 
 

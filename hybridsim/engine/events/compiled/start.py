@@ -163,7 +163,7 @@ def _is_supported(system: System) -> bool:
 
 
 class StartScratch:
-    """The arrays of a call that judges modes without an event."""
+    """The arrays of a call that judges combinations of modes at a point without an event."""
 
     def __init__(self, system: System, tapes: Tapes) -> None:
         n, count, guards, whole = system.n, len(system.automata), system.guard_count, np.int64
