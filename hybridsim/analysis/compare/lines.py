@@ -42,12 +42,12 @@ class Series:
     def __post_init__(self) -> None:
         if not self.values:
             raise UsageError(
-                f"the line of {self.integrator} has no values of {self.varied}",
+                f"no values of {self.varied} are given for {self.integrator}",
                 remedy="use at least one value",
             )
         if (self.varied == "v0") != bool(self.regularized):
             raise UsageError(
-                f"a line with regularized = {self.regularized!r} cannot vary {self.varied!r}",
+                f"`varied` is {self.varied!r}, which does not fit `regularized` = {self.regularized!r}",
                 remedy="vary `v0` if and only if `regularized` is set",
             )
         if not self.label:

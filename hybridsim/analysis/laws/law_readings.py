@@ -53,7 +53,7 @@ def law_readings(measure: Any, models: Iterable[Model], period: float | None) ->
                 f"`measure` {name!r} belongs to a whole run, but this model is measured over its last period"
             )
             raise UsageError(
-                message, remedy="use a reading of a period, such as 'amplitude.x' or 'stops_per_period.f'"
+                message, remedy="use a measure of one period, such as 'amplitude.x' or 'stops_per_period.f'"
             )
         found |= dict.fromkeys(_first_valid(name, models, period))
     return LawReadings(tuple(found), period)

@@ -142,7 +142,7 @@ class ClosedFormKernels(MethodKernels):
         what = "the last zeros of guards"
         whole = len(place) >= 2 and 0.0 <= place[0] < math.inf and 0.0 <= place[1] <= len(place)
         if not whole or len(place) != 2 + int(place[1]) * (components + guards):
-            raise damaged(f"{what} are wrong")
+            raise damaged("the stored zeros of guards are wrong")
         self.horizon, count = float(place[0]), int(place[1])
         try:
             check_modes(
@@ -151,7 +151,7 @@ class ClosedFormKernels(MethodKernels):
                 [len(a.modes) for a in self.system.automata],
             )
         except ValueError:
-            raise damaged(f"{what} are wrong") from None
+            raise damaged("the stored zeros of guards are wrong") from None
         vectors = place[2 : 2 + count * components].reshape(count, components).astype(np.int64)
         hints = place[2 + count * components :].reshape(count, guards)
         is_known = (hints > 0.0).any(axis=1)

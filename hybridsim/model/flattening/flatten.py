@@ -180,7 +180,7 @@ class _Flat:
     def _contact(
         self, use: Use, contact: Contact, number: int | None, copies: Copies, start: Mapping[str, Expression]
     ) -> Contact:
-        """Return the copy of a contact, under another law if the part gets one."""
+        """Return the copy of a contact, with another law if the use of the part sets one."""
         made = copies.of(contact)
         if contact.name in use.laws:
             law = _of_copy(use.laws[contact.name], number)
@@ -238,7 +238,7 @@ def _of_copy(values: tuple[Value, ...], number: int | None) -> Value:
 
 
 def _of_contact(name: str, part: Model, contacts: Collection[str]) -> bool:
-    """Return whether a name can be that of a state of the law of one of some contacts of a part."""
+    """Return whether a name can be a state of the friction law of one of the given contacts."""
     own = [state.name for state in part.states if not isinstance(state, ContactState)]
     if name in own or name in [state.name for state in part.discrete]:
         return False

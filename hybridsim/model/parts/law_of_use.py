@@ -1,4 +1,4 @@
-"""This module defines the friction law that the use of a part gives to a contact of the part."""
+"""This module defines the friction law that a use of a part sets for one of the part's contacts."""
 
 from __future__ import annotations
 

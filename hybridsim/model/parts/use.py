@@ -110,7 +110,7 @@ class Use(Declared):
             raise ExpressionError(message, place=fault.place, remedy=fault.remedy) from None
 
     def _law(self, what: str, value: Any) -> LawOfUse:
-        """Return a law with the values of its parameters, from a law, its name or path, or a pair with the values."""
+        """Return a law with the values of its parameters, from a law, a name, a path, or a pair with values."""
         if isinstance(value, LawOfUse):
             return value
         law, values = value if isinstance(value, tuple) and len(value) == 2 else (value, {})

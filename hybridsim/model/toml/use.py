@@ -108,7 +108,7 @@ def _values(
 def _laws(
     table: Table, part: Model, repeat: int | None, laws: Laws, folder: Path
 ) -> Iterator[tuple[str, tuple[LawOfUse, ...]]]:
-    """Yield the contacts of a part that get another law, with this law."""
+    """Yield the contacts of a part that get another law, each with this law."""
     for keys, value in _contacts(table, part, table.mapping("laws", "laws"), ()):
         found, copies = [], _of_copies(table, value, repeat, "laws", *keys)
         for at, one in copies:
@@ -123,7 +123,7 @@ def _laws(
 def _contacts(
     table: Table, part: Model, values: Mapping[str, Any], keys: tuple[str, ...]
 ) -> Iterator[tuple[tuple[str, ...], Any]]:
-    """Yield the keys of contacts and what `laws` has for each; an unknown contact is reported."""
+    """Yield the keys of contacts with the entries of `laws` for them; an unknown contact is reported."""
     contacts = [contact.name for contact in part.contacts]
     for key, value in values.items():
         path = (*keys, key)

@@ -234,7 +234,7 @@ def test_a_long_run_is_not_repeated_for_ever(monkeypatch) -> None:
         ({"integrators": []}, "no integrators"),
         ({"integrators": ["scipy-rk4"]}, "scipy-rk4"),
         ({"integrators": ["scipy-rk45", "scipy-rk45"]}, "two lines"),
-        ({"rtols": []}, "has no values of rtol"),
+        ({"rtols": []}, "no values of rtol are given"),
         ({"reference": "guess"}, "`reference` cannot be 'guess'"),
         ({"reference": 3}, "`reference` cannot be a int"),
         ({"params": {"mass": 1}}, "no parameter 'mass'"),
