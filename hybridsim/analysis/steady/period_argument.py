@@ -35,7 +35,7 @@ def require_multiple(period: Any, own: float | None, name: str) -> float:
 
 
 def refuse_plain_time(system: System, period: float | None) -> None:
-    """Reject a declaration with plain t if the period is unknown, or if its value does not repeat with the period.
+    """Reject a declaration that contains t itself if it does not repeat with the period, or the period is unknown.
 
     Raises
     ------

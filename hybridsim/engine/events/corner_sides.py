@@ -27,7 +27,7 @@ _ROUNDS_PER_MODE = 4  # orders of a series: each order settles at least one more
 def sides_along(
     resolution: EventData, z: np.ndarray, x: np.ndarray, has_flow: bool = True
 ) -> tuple[np.ndarray, dict[int, int]]:
-    """Return `z` with the sides of corners and loads along the flow, and the guards of these components at zero.
+    """Choose the sides of corners and loads by the motion; return the new modes, and those guards that are zero.
 
     A guard that was located at zero is zero on both sides, whatever rounding makes of its value. With has_flow=False
     only values decide, because the modes of surfaces are not known yet.

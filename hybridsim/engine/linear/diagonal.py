@@ -143,7 +143,7 @@ def check_eigenvectors(values: Any, vectors: Any, inverses: Any, horizon: float,
 
 @kernel
 def write_diagonal(values: Any, vectors: Any, inverses: Any, exponent: int, found: Any, out: Any) -> None:
-    """Write one block for each eigenvalue of the diagonal matrices to `out` (`Modals` of `modal`)."""
+    """Write one block for each eigenvalue of the diagonal matrices to `out`."""
     counts, scales, chosen = found.counts, found.scales, found.is_diagonal
     for k in range(values.shape[0]):
         out.counts[k] = counts[k]
