@@ -120,13 +120,13 @@ def test_the_page_on_many_contacts_runs_and_is_short(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     shown = blocks(ROOT / "docs" / "how-to" / "many-contacts.md", "python")
-    assert [len(code.splitlines()) < 30 for code in shown] == [True] * 6
+    assert [len(code.splitlines()) < 30 for code in shown] == [True] * 7
     script = tmp_path / "shown.py"
     script.write_text("\n".join(shown), encoding="utf-8")
     runpy.run_path(str(script))
     said = re.findall(r"^print\(.*\)  # (.+)$", "\n".join(shown), re.MULTILINE)
     assert capsys.readouterr().out.splitlines() == said
-    assert len(said) == 10
+    assert len(said) == 11
     first = tmp_path / "first.py"
     first.write_text(
         shown[0] + 'hs.simulate(system.to_model(), (0, 1), integrator="dop853")', encoding="utf-8"

@@ -218,7 +218,7 @@ def _conclusion(advice: Advice) -> str:
     if advice.region is not None:
         return f"over {advice.region.status.size} points of {', '.join(advice.region.axes)}"
     simplest, setting = advice.simplest, advice.integrator
-    how = f"; run the full model by {setting.title}" if setting is not None else ""
+    how = f"; the full model runs fastest by {setting.title}" if setting is not None else ""
     if all(step.verdict in (*WITHOUT_TRIAL, FULL) for step in advice.ladder):
         return f"no simpler model could be tried, so the full model is needed{how}"
     if simplest.verdict == FULL:
