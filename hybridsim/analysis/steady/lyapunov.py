@@ -22,6 +22,7 @@ _LARGEST = 1e100  # factor of a part
 _HALVINGS = 12  # of a part whose factors are not resolved
 _PARTS = 60  # of the motion whose largest exponent is found
 _PERIODS = 5  # in each of them
+FOLLOWED = _PARTS * _PERIODS  # periods over which the largest exponent is measured
 
 
 class Growth:

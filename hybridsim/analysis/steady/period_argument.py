@@ -1,4 +1,4 @@
-"""This module checks the period of a steady state: the argument `period`, and rates that depend on t itself."""
+"""This module checks the forcing for a steady state: the argument `period`, and declarations that never repeat."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import Any
 from hybridsim.arguments import cannot_be, number
 from hybridsim.engine.system.system import System
 from hybridsim.errors import UsageError
+from hybridsim.expr import evaluate
 from hybridsim.expr.grammar import TIME
 from hybridsim.model import Model
 from hybridsim.model.meanings import Meanings
@@ -32,6 +33,35 @@ def require_multiple(period: Any, own: float | None, name: str) -> float:
             remedy="remove `period`, or use a whole multiple of the forcing period",
         )
     return found
+
+
+def refuse_what_ends(system: System) -> None:
+    """Reject models with impacts, and models that an event or an input changes permanently."""
+    model = system.model
+    if system.is_unilateral.any():
+        raise UsageError(
+            f"model {model.name} has impacts, for which steady states are not supported",
+            remedy="write impacts as a guard and a reset, or use hs.simulate until the motion repeats",
+        )
+    for declared in model.inputs:
+        if declared.period is None:
+            raise UsageError(
+                f"model {model.name} is driven by {declared.subject}, which does not repeat (a {declared.kind}), so "
+                "there is no steady state",
+                remedy=f"use a periodic input, or replace the {declared.kind} by its final value",
+            )
+    for clock in model.schedules:
+        if clock.period is None or clock.count is not None:
+            raise UsageError(
+                f"schedule {clock.name} of model {model.name} ends, but a steady state needs schedules without an end",
+                remedy="remove the schedule, or remove its `count`",
+            )
+        start = evaluate(clock.start, system.values) if clock.start is not None else 0.0
+        if start >= evaluate(clock.period, system.values):
+            raise UsageError(
+                f"clock {clock.name} of model {model.name} begins after its first period",
+                remedy="use a `start` below the period of the clock",
+            )
 
 
 def refuse_plain_time(system: System, period: float | None) -> None:

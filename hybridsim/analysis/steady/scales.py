@@ -4,10 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
+from hybridsim.analysis.variations.sizes import ranges
 from hybridsim.engine.system.system import System
 from hybridsim.engine.system.tangents import TangentTape
+from hybridsim.solution import Solution
 
 _ROUNDINGS = 10.0  # multiple of a run's relative tolerance: relative motion below it is rounding
+LEAST = (
+    1e-3  # smallest scale of a state relative to its size, because a state that hardly moves has fewer digits
+)
 _LOOSEST = 1e-10  # largest tolerance used here, because a looser one hides slow motions
 
 
@@ -32,6 +37,43 @@ def coupled_sizes(system: System, x: np.ndarray, p: np.ndarray, z: np.ndarray) -
     ratio[~np.isfinite(ratio)] = 0.0
     np.fill_diagonal(ratio, 1.0)
     return np.asarray((ratio * sizes[None, :]).max(axis=1))
+
+
+def shared_sizes(solution: Solution, since: float) -> np.ndarray:
+    """Return the size (n,) of each state late in a run, or the size that it has with the energy of another one.
+
+    Two states that act on each other exchange energy, at once or over a third state, as two masses at the ends of a
+    spring do over their velocities. With equal energies the ratio of their sizes is the square root of the ratio of
+    the mutual effects. The effects are those of the modes late in the run, and of these with all contacts in slip,
+    because stick hides effects.
+    """
+    system, last = solution._system, solution._segments[-1]
+    sizes = np.max(np.abs(ranges(solution, since)), axis=0)
+    if not system.has_tape or not system.n:
+        return np.asarray(sizes)
+    modes = solution._segments.modes()[solution._of_model.frame.ends > since]
+    slipping = modes.copy()
+    for c in system.surface_of:
+        slipping[slipping[:, c] == system.automata[c].hold, c] = 0 if system.automata[c].hold else 1
+    every = np.unique(np.concatenate([modes, slipping]), axis=0)
+    effects = np.max([np.abs(_rates(system, last.x[-1], last.p, z)[1]) for z in every], axis=0)
+    ratio = _ratios(effects) if np.isfinite(effects).all() else np.zeros_like(effects)
+    is_raised = np.zeros(len(sizes), dtype=np.bool_)
+    for _ in range(len(sizes)):
+        shares = (ratio * sizes[None, :]).max(axis=1)
+        rises = (shares > sizes) & ~is_raised  # once only: a circle of effects may have a gain
+        if not rises.any():
+            break
+        sizes[rises], is_raised[rises] = shares[rises], True
+    return np.asarray(sizes)
+
+
+def _ratios(effects: np.ndarray) -> np.ndarray:
+    """Return the ratio (n, n) of the sizes of two states with equal energies, or zero without mutual effects."""
+    has_any = (effects > 0.0) | (effects.T > 0.0)
+    mutual = np.where(has_any, effects, effects @ effects)
+    is_mutual = (mutual > 0.0) & (mutual.T > 0.0)
+    return np.sqrt(np.divide(mutual, mutual.T, out=np.zeros_like(mutual), where=is_mutual))
 
 
 def rounding_of(sizes: np.ndarray, rtol: float) -> np.ndarray:

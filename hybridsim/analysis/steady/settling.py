@@ -18,7 +18,7 @@ from hybridsim.analysis.steady.quiet import (
     middle_of_longest,
     quiet_offset,
 )
-from hybridsim.analysis.steady.scales import rounding_of
+from hybridsim.analysis.steady.scales import LEAST, rounding_of, shared_sizes
 from hybridsim.analysis.variations.off_zero import rates_of
 from hybridsim.analysis.variations.sizes import ranges
 from hybridsim.solution import Solution
@@ -130,10 +130,14 @@ def scale_of(solution: Solution, since: float) -> np.ndarray:
         index = np.flatnonzero(solution._of_model.frame.ends > since)
         held = np.array([solution._segments[int(i)].p[solution._system.layout.discrete_slice] for i in index])
         low, high = np.append(low, held.min(axis=0)), np.append(high, held.max(axis=0))
-    return np.maximum(0.5 * (high - low), _DIGITS * np.maximum(np.abs(low), np.abs(high)))
+    return np.maximum(0.5 * (high - low), LEAST * np.maximum(np.abs(low), np.abs(high)))
 
 
-_DIGITS = 1e-3
+def forced_scale_of(solution: Solution, since: float) -> np.ndarray:
+    """Return the scale (n + d,) of each state of a forced motion, which is not below a fraction of `shared_sizes`."""
+    scale, least = scale_of(solution, since), LEAST * shared_sizes(solution, since)
+    scale[: len(least)] = np.maximum(scale[: len(least)], least)
+    return scale
 
 
 def forced_passings(motion: Motion, start: Point | None, period: float, count: int, phase: float) -> Passings:
@@ -157,7 +161,7 @@ def forced_passings(motion: Motion, start: Point | None, period: float, count: i
         values = np.concatenate([values, discrete], axis=1)
     late = solution.t_end - max(1, count // 4) * period
     motion.sizes = np.abs(ranges(solution, late)).max(axis=0)
-    return Passings(times, values, scale_of(solution, late), replace(point_at_end(solution), at=phase))
+    return Passings(times, values, forced_scale_of(solution, late), replace(point_at_end(solution), at=phase))
 
 
 def free_passings(

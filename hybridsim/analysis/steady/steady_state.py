@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 
 from hybridsim import arguments
+from hybridsim.analysis.extrapolation.model_periods import extrapolated
 from hybridsim.analysis.keyword_options import refuse_unknown
 from hybridsim.analysis.steady.incommensurate import follow
-from hybridsim.analysis.steady.lyapunov import largest_exponents
+from hybridsim.analysis.steady.lyapunov import FOLLOWED, largest_exponents
 from hybridsim.analysis.steady.motion import (
     CostsMore,
     CostsTooMuch,
@@ -21,9 +22,13 @@ from hybridsim.analysis.steady.motion import (
     Motion,
     Point,
 )
-from hybridsim.analysis.steady.period_argument import refuse_plain_time, require_multiple
+from hybridsim.analysis.steady.period_argument import (
+    refuse_plain_time,
+    refuse_what_ends,
+    require_multiple,
+)
 from hybridsim.analysis.steady.result import SteadyState
-from hybridsim.analysis.steady.scales import rounding_of
+from hybridsim.analysis.steady.scales import rounding_of, shared_sizes
 from hybridsim.analysis.steady.settling import (
     CLOSER,
     Passings,
@@ -46,10 +51,8 @@ from hybridsim.analysis.variations.sizes import ranges
 from hybridsim.arguments import cannot_be
 from hybridsim.calls import refusing
 from hybridsim.engine.system.period import all_periods, common_period
-from hybridsim.engine.system.system import System
 from hybridsim.engine.system.system_cache import system_of
 from hybridsim.errors import UsageError
-from hybridsim.expr import evaluate
 from hybridsim.mechanics.declaration.system import MechanicalSystem
 from hybridsim.model import Model
 from hybridsim.simulate import simulate
@@ -64,6 +67,7 @@ _FIRST_RUN = {
 }  # the limits of that run; if they are reached, the model's own time scale is shorter
 _FEWEST = 4  # passages that are needed for a decision
 _WAIT = 256  # periods that take as long as a few Newton steps
+_FIRST_EXTRAPOLATION = 128  # periods after which the limit of contacts that slip ever less is extrapolated
 _MARGIN = 1.1  # on the expected number of periods
 _GROWS = 1.2  # a larger growth means a state that grows without end
 _TIGHTER = 1e-2  # the runs' tolerance relative to that of the steady state
@@ -161,7 +165,7 @@ def steady_state(
         chosen = {"params": params, "x0": x0, "z0": z0, "period": period, "integrator": integrator, **options}
         return steady_state_of_structure(model, effort, used, report, **chosen)
     system = system_of(model)
-    _refuse_what_ends(system)
+    refuse_what_ends(system)
     refuse_plain_time(system, None if period is None else require_multiple(period, None, model.name))
     chosen = {"x0": x0, "z0": z0, "period": period, "integrator": integrator, **options}
     own = common_period(system)
@@ -217,6 +221,8 @@ class _Search:
         self.largest = np.zeros(len(motion.names))  # scale of each state when it moved most, without forcing
         self.without = 0  # consecutive intervals on which nothing returned
         self.expected = 0  # expected number of periods until the motion has settled
+        can_extrapolate = system_of(motion.model).surface_of and not motion.discrete
+        self._next_extrapolation = _FIRST_EXTRAPOLATION if can_extrapolate else math.inf
 
     def run(self) -> SteadyState:
         passings = self._follow(None)
@@ -328,7 +334,12 @@ class _Search:
         if self.period is not None and self.expected <= _WAIT:
             return None  # it settles before Newton's method would be ready
         self.expected = 0
-        return self._shot(passings, multiple)
+        shot = self._shot(passings, multiple)
+        if shot is None and self.period is not None and self.periods >= self._next_extrapolation:
+            self._next_extrapolation = 2 * self.periods
+            most = min(self.periods, _MAX_PERIODS_PER_RUN)
+            return extrapolated(self.motion, passings, self.period, self.tol, most)
+        return shot
 
     def _shot(self, passings: Passings, multiple: int) -> Orbit | None:
         start = self._orbit(passings, multiple)
@@ -361,8 +372,8 @@ class _Search:
         if any((values != held[0]).any() for values in held):
             return False
         low, high = ranges(solution)
-        rounding = rounding_of(self.motion.coupled_sizes(orbit.start), self.motion.rtol)
-        return bool((high - low <= rounding).all())
+        sizes = np.maximum(self.motion.coupled_sizes(orbit.start), shared_sizes(solution, solution.t_start))
+        return bool((high - low <= rounding_of(sizes, self.motion.rtol)).all())
 
     def _other(self, passings: Passings) -> SteadyState:
         """Classify a motion that does not repeat by its largest Lyapunov exponent."""
@@ -380,19 +391,15 @@ class _Search:
             kind = QUASI
         else:
             kind = UNSETTLED
-        message = (
-            f"{kind} after {self.periods} periods: "
-            + (
-                f"largest Lyapunov exponent {exponent:.3g} per unit of time"
-                if has_slopes
-                else "its kind is unknown, because derivatives of Python functions are unknown"
-            )
-            + (
-                f", but {leaving} never returns: nothing restores it, or it only accumulates"
-                if leaving
-                else ""
-            )
-        )
+        if not has_slopes:
+            reason = "its kind is unknown, because derivatives of Python functions are unknown"
+        elif kind == UNSETTLED:
+            reason = f"over {FOLLOWED} more periods a small change {_grown(exponent * FOLLOWED * base)}"
+        else:
+            reason = f"largest Lyapunov exponent {exponent:.3g} per unit of time"
+        message = f"{kind} after {self.periods} periods: {reason}"
+        if leaving:
+            message += f", but {leaving} never returns: nothing restores it, or it only accumulates"
         found = _found(self.motion, kind, replace(self._orbit(passings, 1), residual=passings.residual(1)))
         found.lyapunov, found.message, found.periods = exponent, message, self.periods
         return found
@@ -417,10 +424,14 @@ class _Search:
         return names[int(np.argmax(grown))] if grown.any() else ""
 
 
-_LONGER, _ROUNDS = (
-    8,
-    3,
-)  # factor by which an interval is lengthened, and number of intervals without a return
+_LONGER, _ROUNDS = 8, 3  # factor by which an interval is lengthened, and number of intervals without a return
+
+
+def _grown(logarithm: float) -> str:
+    """Return the words for the growth of a small change, of which the natural logarithm is given."""
+    if logarithm == -math.inf:
+        return "vanishes"
+    return f"is multiplied by 10^{logarithm / math.log(10.0):.1f}"
 
 
 def _found(
@@ -433,32 +444,3 @@ def _found(
     message: str = "",
 ) -> SteadyState:
     return SteadyState(motion.unwatched(), kind, orbit, is_free, newton_steps, periods, message or kind)
-
-
-def _refuse_what_ends(system: System) -> None:
-    """Reject models with impacts, and models that an event or an input changes permanently."""
-    model = system.model
-    if system.is_unilateral.any():
-        raise UsageError(
-            f"model {model.name} has impacts, for which steady states are not supported",
-            remedy="write impacts as a guard and a reset, or use hs.simulate until the motion repeats",
-        )
-    for declared in model.inputs:
-        if declared.period is None:
-            raise UsageError(
-                f"model {model.name} is driven by {declared.subject}, which does not repeat (a {declared.kind}), so "
-                "there is no steady state",
-                remedy=f"use a periodic input, or replace the {declared.kind} by its final value",
-            )
-    for clock in model.schedules:
-        if clock.period is None or clock.count is not None:
-            raise UsageError(
-                f"schedule {clock.name} of model {model.name} ends, but a steady state needs schedules without an end",
-                remedy="remove the schedule, or remove its `count`",
-            )
-        start = evaluate(clock.start, system.values) if clock.start is not None else 0.0
-        if start >= evaluate(clock.period, system.values):
-            raise UsageError(
-                f"clock {clock.name} of model {model.name} begins after its first period",
-                remedy="use a `start` below the period of the clock",
-            )

@@ -1,4 +1,4 @@
 """This package finds the steady motions of mechanical systems given as arrays.
 
-Read `steady_state`, then `period_map`, `settling` and `result`.
+Read `steady_state`, then `period_map` and `result`.
 """

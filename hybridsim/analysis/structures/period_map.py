@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from hybridsim.analysis.structures.scales import FLOOR, masses_of, natural_sizes
+from hybridsim.analysis.structures.scales import FLOOR, masses_of, natural_sizes, with_floor
 from hybridsim.engine.system.period import common_multiple
 from hybridsim.errors import SimulationError, UsageError
 from hybridsim.mechanics.codes import DONE
@@ -17,6 +17,7 @@ from hybridsim.mechanics.series_loop.run import MechanicalRun
 from hybridsim.mechanics.series_loop.series_trajectory import SeriesTrajectory
 
 _SAMPLES = 64  # per period, for the sizes of the states
+_RESTS = 1e-12  # a smaller range relative to the largest size of its kind is rest
 _ABSOLUTE = 1e-3  # absolute tolerance of a state, in units of the relative tolerance times its size
 
 
@@ -110,10 +111,11 @@ class PeriodMap:
         self._carry_out((0.0, self.period))
         return self.x
 
-    def sizes(self) -> tuple[np.ndarray, np.ndarray]:
-        """Follow the motion for one period, and return half the range and the largest size (2n,) of each state.
+    def measure(self) -> tuple[np.ndarray, bool]:
+        """Follow the motion for one period, and return the scale (2n,) of each state and whether nothing moves.
 
-        The absolute tolerances of later periods follow these sizes.
+        The scale is half the range over the period. It has floors: a fraction of the largest size of the state, and
+        the fraction of `with_floor`. The absolute tolerances of later periods follow these sizes.
         """
         self._run.is_recorded = True
         self._carry_out((0.0, self.period))
@@ -122,7 +124,9 @@ class PeriodMap:
         states = segments.states(np.linspace(0.0, self.period, _SAMPLES + 1), True)
         largest = np.abs(states).max(axis=0)
         self._set_tolerances(largest)
-        return 0.5 * np.ptp(states, axis=0), largest
+        half, largest = 0.5 * np.ptp(states, axis=0), np.maximum(largest, self.natural)
+        rests = half <= _RESTS * with_floor(largest, self.masses, 1.0)
+        return with_floor(np.maximum(half, FLOOR * largest), self.masses), bool(rests.all())
 
     def recorded(self, periods: int, offset: float) -> SeriesTrajectory:
         """Record the motion over some periods, beginning within the first one; the map cannot be used afterwards."""

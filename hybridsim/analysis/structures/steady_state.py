@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 
 from hybridsim import arguments
+from hybridsim.analysis.extrapolation.settling import Settled, Settling
 from hybridsim.analysis.steady.period_argument import require_multiple
 from hybridsim.analysis.steady.quiet import middle_of_longest
 from hybridsim.analysis.steady.settling import Passings
 from hybridsim.analysis.steady.together import Effort
 from hybridsim.analysis.structures.period_map import PeriodMap, forcing_period_of
 from hybridsim.analysis.structures.result import StructureSteadyState
-from hybridsim.analysis.structures.settling import Settled, Settling
 from hybridsim.analysis.structures.swept import model_to_sweep
 from hybridsim.engine.native.compiler import announce_compilation
 from hybridsim.errors import UsageError, nearest

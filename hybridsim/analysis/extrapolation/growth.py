@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
+from hybridsim.analysis.extrapolation.period_map import PeriodMap
 from hybridsim.analysis.steady.settling import relative
-from hybridsim.analysis.structures.period_map import PeriodMap
 
 _CHANGE = 1e-6  # of the scale: the change of the states
 _ROUND = 4  # repetitions after which the growth is measured
@@ -17,7 +19,7 @@ _NEUTRAL = 2e-4  # growth per repetition that is allowed, as of a direction in w
 
 
 def grows(period_map: PeriodMap, scale: np.ndarray, multiple: int, direction: np.ndarray) -> bool:
-    """Return whether a disturbance (2n,) of a repeating motion grows; if it decays, restore the map.
+    """Return whether a disturbance (n,) of a repeating motion grows; if it decays, restore the map.
 
     After some repetitions the change is in the direction that shrinks least or grows fastest. Its growth over a
     repetition then converges to the size of the largest multiplier. The motion is followed with and without the
@@ -44,10 +46,8 @@ def grows(period_map: PeriodMap, scale: np.ndarray, multiple: int, direction: np
     return False
 
 
-def _followed(
-    period_map: PeriodMap, start: tuple[np.ndarray, ...], periods: int
-) -> tuple[tuple[np.ndarray, ...], np.ndarray]:
-    """Follow the motion over some periods from a stored start; return the new stored state and the states (2n,)."""
+def _followed(period_map: PeriodMap, start: Any, periods: int) -> tuple[Any, np.ndarray]:
+    """Follow the motion over some periods from a stored start; return the new stored state and the states (n,)."""
     period_map.restore(start)
     for _ in range(periods):
         period_map.advance()

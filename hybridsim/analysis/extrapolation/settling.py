@@ -1,4 +1,4 @@
-"""This module follows a forced mechanical system until its states repeat from period to period.
+"""This module follows a forced motion until its states repeat from period to period.
 
 A run of plain periods is followed as long as the states change. If the sequence of events is the same in
 consecutive periods, the period map is smooth there, and the states are extrapolated to their limit. The
@@ -19,12 +19,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from hybridsim.analysis.extrapolation.growth import grows
+from hybridsim.analysis.extrapolation.limit import limit_of
+from hybridsim.analysis.extrapolation.period_map import PeriodMap
 from hybridsim.analysis.steady.motion import Point
 from hybridsim.analysis.steady.settling import Passings, relative
-from hybridsim.analysis.structures.extrapolation import limit_of
-from hybridsim.analysis.structures.growth import grows
-from hybridsim.analysis.structures.period_map import PeriodMap
-from hybridsim.analysis.structures.scales import FLOOR, with_floor
 
 _EVERY = 4  # periods between tests
 _COUNTS = (4, 8, 16, 32, 64, 128)  # periods in an extrapolation
@@ -36,7 +35,6 @@ _CLOSER = 0.5  # an extrapolation that does not reduce the change by this factor
 _SQUARED = (0.1, 0.5)  # reduction of the change by an extrapolation that covers about half of the distance
 _TWICE = 0.9  # additional length of the next extrapolation, which must not go beyond the limit
 _NEARLY = 1e4  # multiple of the tolerance: below it, the motion may be about to repeat
-_RESTS = 1e-12  # a smaller range relative to the largest size of its kind is rest
 
 
 class Settled(NamedTuple):
@@ -59,7 +57,7 @@ class Settled(NamedTuple):
 class _Trial(NamedTuple):
     """The data before an extrapolation, which are restored if the extrapolation fails."""
 
-    former: tuple[np.ndarray, ...]
+    former: Any
     states: list[np.ndarray]
     pairs: list[tuple[np.ndarray, np.ndarray]]
     fresh: int
@@ -136,13 +134,10 @@ class Settling:
 
     def _passings(self) -> tuple[Passings, bool]:
         """Return the states at the starts of all periods so far, and whether the motion has come to rest."""
-        half, largest = self._follow(self.map.sizes)
-        largest = np.maximum(largest, self.map.natural)
-        scale = with_floor(np.maximum(half, FLOOR * largest), self.map.masses)
+        scale, rests = self._follow(self.map.measure)
         last = Point(self.map.x, np.zeros(0), {}, self.map.modes)
         times = self.map.period * np.arange(len(self._states))
-        rests = half <= _RESTS * with_floor(largest, self.map.masses, 1.0)
-        return Passings(times, np.array(self._states), scale, last), bool(rests.all())
+        return Passings(times, np.array(self._states), scale, last), rests
 
     def _extrapolate(self, scale: np.ndarray) -> None:
         """Replace the states by their extrapolated limit, computed from periods with equal events."""
