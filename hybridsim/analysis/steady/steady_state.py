@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from hybridsim import arguments
-from hybridsim.analysis.extrapolation.model_periods import extrapolated
 from hybridsim.analysis.keyword_options import refuse_unknown
 from hybridsim.analysis.steady.incommensurate import follow
 from hybridsim.analysis.steady.lyapunov import FOLLOWED, largest_exponents
@@ -336,6 +335,8 @@ class _Search:
         self.expected = 0
         shot = self._shot(passings, multiple)
         if shot is None and self.period is not None and self.periods >= self._next_extrapolation:
+            from hybridsim.analysis.extrapolation.model_periods import extrapolated
+
             self._next_extrapolation = 2 * self.periods
             most = min(self.periods, _MAX_PERIODS_PER_RUN)
             return extrapolated(self.motion, passings, self.period, self.tol, most)
