@@ -227,6 +227,25 @@ def test_an_error_in_an_inner_part_names_its_line_and_the_path(folder: Path) -> 
     assert len(fault.errors) == 1  # not again for the second use
 
 
+def test_a_part_in_a_part_in_a_part_has_three_names_in_values_and_errors(folder: Path) -> None:
+    whole = "[use.train]\nmodel = 'bogie.toml'\nstart.left.hub.x = 3\n"
+    written(
+        folder,
+        hub=SPRING,
+        axle=AXLE,
+        bogie="[use.left]\nmodel = 'axle.toml'\n[use.right]\nmodel = 'axle.toml'\n",
+    )
+    model = loaded(folder, whole)
+    assert model.start_values()["train.left.hub.x"] == 3.0
+    assert model.start_values()["train.right.hub.x"] == 0.0
+    written(folder, hub=SPRING.replace('k*(u - x)" }\n[out', 'k*(u - y)" }\n[out'))
+    fault = refused(folder, whole)
+    assert str(fault).startswith(
+        f"{folder / 'hub.toml'}:7, use.train > use.left > use.hub: state x, der: unknown name 'y'"
+    )
+    assert len(fault.errors) == 1
+
+
 def test_an_error_of_a_value_names_the_copy(folder: Path) -> None:
     written(
         folder, axle=AXLE.replace("hub.toml", "spring.toml") + 'parameters.k = "1/c"\n[parameters]\nc = 1\n'

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import inspect
 import json
 import math
 import re
@@ -18,23 +19,54 @@ from hybridsim.cli import main
 EXAMPLES = Path(__file__).parents[3] / "docs" / "examples" / "parts"
 
 
-def test_blocks_move_as_the_chain_that_is_built_from_matrices(tmp_path: Path) -> None:
+def twenty_blocks() -> hs.Model:
+    belt = hs.Contact("f", velocity="v - belt", normal=1, law="hyperbolic", arguments={"mu": 1, "delta": 3})
+    block = hs.Model(
+        "block",
+        states=[hs.State("x", 0, "v"), hs.State("v", 0, "left + right - 3*x - f")],
+        parameters={"belt": 0.2},
+        inputs=[hs.Input("left", "connected"), hs.Input("right", "connected")],
+        contacts=[belt],
+    )
+    left = "block[i-1].x if i > 1 else block[i].x"
+    right = "block[i+1].x if i < 20 else block[i].x"
+    blocks = hs.Use(
+        "block", block, repeat=20, start={"x": "0.5*sin(7*i)"}, connect={"left": left, "right": right}
+    )
+    return hs.Model("chain", use=[blocks])
+
+
+def test_twenty_blocks_take_fifteen_lines_of_python() -> None:
+    assert twenty_blocks() == hs.load(EXAMPLES / "chain.toml")
+    assert len(inspect.getsource(twenty_blocks).rstrip().splitlines()) - 1 <= 15
+
+
+@pytest.mark.parametrize("integrator", ["taylor", "dop853"])
+def test_blocks_move_as_the_chain_that_is_built_from_matrices(integrator: str) -> None:
     """Same modes in the same order, event times and states to 1e-12, for another set of equations."""
-    n = 6  # the example has 20, which take longer to compile
-    for name in ("block", "chain"):
-        text = (EXAMPLES / f"{name}.toml").read_text(encoding="utf-8")
-        (tmp_path / f"{name}.toml").write_text(text.replace("20", str(n)), encoding="utf-8")
-    parts = hs.load(tmp_path / "chain.toml")
-    start = {f"q{i}": 0.5 * math.sin(7 * i) for i in range(1, n + 1)}
-    chain = hs.chain_on_belt(n).to_model().with_start(**start)
-    one, other = (hs.simulate(model, (0, 4), integrator="taylor") for model in (parts, chain))
-    assert len(one.events) == len(other.events) > 6
+    start = {f"q{i}": 0.5 * math.sin(7 * i) for i in range(1, 21)}
+    chain = hs.chain_on_belt(20).to_model().with_start(**start)
+    one, other = (
+        hs.simulate(model, (0, 4), integrator=integrator, rtol=1e-13) for model in (twenty_blocks(), chain)
+    )
+    assert len(one.events) == len(other.events) > 20
     for event, reference in zip(one.events, other.events, strict=True):
         assert event.component == f"block{reference.component.removeprefix('f')}.f"
         assert (event.source, event.target) == (reference.source, reference.target)
         assert event.t == pytest.approx(reference.t, abs=1e-12)
-    order = [one.names.index(f"block{i}.{name}") for i in range(1, n + 1) for name in "xv"]
-    assert one(4.0)[order] == pytest.approx(other(4.0), abs=1e-12)
+    order = [one.names.index(f"block{i}.{name}") for i in range(1, 21) for name in "xv"]
+    t = np.linspace(0, 4, 101)
+    assert np.abs(one(t)[order] - other(t)).max() < 1e-12
+
+
+def test_the_flat_text_runs_to_the_same_bits() -> None:
+    parts = hs.load(EXAMPLES / "chain.toml")
+    one, other = (
+        hs.simulate(model, (0, 4), integrator="taylor")
+        for model in (parts, hs.Model.from_toml(parts.to_toml()))
+    )
+    assert one.t.tobytes() == other.t.tobytes() and one.y.tobytes() == other.y.tobytes()
+    assert [event.t for event in one.events] == [event.t for event in other.events] != []
 
 
 WHEEL = """
