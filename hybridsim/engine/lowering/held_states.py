@@ -44,9 +44,9 @@ class HeldStates:
         free = self._without_choice(choices)
         pins = self._chosen(choices, free)
         if pins is None:
-            self._refuse_dependent(list(choices))
-            unique = {c for c in choices if lowering.components[c[0]].surface.unique}
-            choices = {c: [] if c in unique else i for c, i in choices.items()}
+            loose = self._never_together(list(choices))
+            loose |= {c for c in choices if lowering.components[c[0]].surface.unique}
+            choices = {c: [] if c in loose else i for c, i in choices.items()}
             free = self._without_choice(choices)
             pins = self._chosen(choices, free)
         if pins is None:
@@ -103,12 +103,30 @@ class HeldStates:
         pinned = {c: found for c, found in choices.items() if c not in free}
         return self._match(list(pinned), pinned, {})
 
-    def _refuse_dependent(self, linear: list[Held]) -> None:
-        """Raise an error for surfaces that are linearly dependent."""
-        sp = self.lowering.sp
+    def _never_together(self, linear: list[Held]) -> set[Held]:
+        """Return the constraints of gaps that are linearly dependent, but never all zero at once.
+
+        An example is a row of bodies between two walls: the sum of all gaps is a constant.
+
+        Raises
+        ------
+        ModelError
+            For other surfaces that are linearly dependent.
+        """
+        sp, found = self.lowering.sp, set()
         slopes = sp.Matrix([[sp.diff(self.surfaces[c], x) for x in self.states] for c in linear])
-        if not slopes.free_symbols & set(self.states) and slopes.rank() < len(linear):
-            raise self._dependent(linear)
+        if slopes.free_symbols & set(self.states):
+            return set()
+        for weights in slopes.T.nullspace():
+            members = [(c, weight) for c, weight in zip(linear, weights, strict=True) if weight != 0]
+            if any(k == 1 for (_, k), _ in members):
+                continue  # the rates of gaps, which are held together with the gaps themselves
+            apart = simplified(sp.Add(*(weight * self.surfaces[c] for c, weight in members)))
+            are_gaps = all(self.lowering.components[c].surface.is_unilateral for (c, _), _ in members)
+            if not are_gaps or apart == 0 or not apart.free_symbols <= self.lowering.parameters:
+                raise self._dependent(linear)
+            found |= {(c, k) for (c, _), _ in members for k in (0, 1)}
+        return found & set(linear)
 
     def _dependent(self, held: list[Held]) -> ModelError:
         lowering = self.lowering
