@@ -28,7 +28,6 @@ FILES = {
     "engine/events/zeno/accumulation.py": 388,
     "engine/linear/motion.py": 370,
     "engine/lowering/emit.py": 358,
-    "engine/lowering/held_states.py": 303,
     "engine/lowering/lower.py": 373,
     "engine/roots/roots.py": 355,
     "engine/run/mode_loop.py": 572,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from hybridsim.engine.lowering.elimination import eliminated
+from hybridsim.engine.lowering.elimination import eliminated, never_all_zero
 from hybridsim.engine.lowering.lowering_state import LoweringState
 from hybridsim.engine.lowering.program import Assign, Item, Switch
 from hybridsim.errors import ModelError
@@ -44,7 +44,9 @@ class HeldStates:
         free = self._without_choice(choices)
         pins = self._chosen(choices, free)
         if pins is None:
-            loose = self._never_together(list(choices))
+            loose = never_all_zero(lowering, surfaces)
+            if loose is None:
+                raise self._dependent(list(choices))
             loose |= {c for c in choices if lowering.components[c[0]].surface.unique}
             choices = {c: [] if c in loose else i for c, i in choices.items()}
             free = self._without_choice(choices)
@@ -102,31 +104,6 @@ class HeldStates:
         """Return a different state for each constraint without projection, or None if there is no such choice."""
         pinned = {c: found for c, found in choices.items() if c not in free}
         return self._match(list(pinned), pinned, {})
-
-    def _never_together(self, linear: list[Held]) -> set[Held]:
-        """Return the constraints of gaps that are linearly dependent, but never all zero at once.
-
-        An example is a row of bodies between two walls: the sum of all gaps is a constant.
-
-        Raises
-        ------
-        ModelError
-            For other surfaces that are linearly dependent.
-        """
-        sp, found = self.lowering.sp, set()
-        slopes = sp.Matrix([[sp.diff(self.surfaces[c], x) for x in self.states] for c in linear])
-        if slopes.free_symbols & set(self.states):
-            return set()
-        for weights in slopes.T.nullspace():
-            members = [(c, weight) for c, weight in zip(linear, weights, strict=True) if weight != 0]
-            if any(k == 1 for (_, k), _ in members):
-                continue  # the rates of gaps, which are held together with the gaps themselves
-            apart = simplified(sp.Add(*(weight * self.surfaces[c] for c, weight in members)))
-            are_gaps = all(self.lowering.components[c].surface.is_unilateral for (c, _), _ in members)
-            if not are_gaps or apart == 0 or not apart.free_symbols <= self.lowering.parameters:
-                raise self._dependent(linear)
-            found |= {(c, k) for (c, _), _ in members for k in (0, 1)}
-        return found & set(linear)
 
     def _dependent(self, held: list[Held]) -> ModelError:
         lowering = self.lowering
