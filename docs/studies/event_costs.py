@@ -137,13 +137,14 @@ How much do monitors, clocks, tables and impacts add to the time of a run? With 
 run takes {min(never):.2f} to {max(never):.2f} times as long as without it.
 
 `exact`, `taylor` and `dop853` run from event to event in compiled code, in which an ordinary event takes
-microseconds. Python handles events that need a message or a joint decision, in about a millisecond. Three rows of
+microseconds. Python handles events that need a message or a joint decision, in about a millisecond. Two rows of
 the table have such events:
 
 - A quadratic monitor is not a closed form of `exact`.
 - A monitor of the sliding speed is zero at the same time as the guard of the contact. The monitor and the contact
   are then decided together.
-- At an impact all contacts that are struck together are decided together.
+
+An impact that strikes one contact is ordinary. Python decides an impact that strikes several contacts together.
 
 `python docs/studies/event_costs.py` writes this page. The table gives medians of processor time in one process. A
 run with the part in the first column and a run without this part alternate. The monitors are added to 100 periods

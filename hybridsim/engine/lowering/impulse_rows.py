@@ -27,7 +27,7 @@ def impulses(lowering: Lowering) -> Rows:
     """Return the code of the function ``impulses``, or no code if the model has no unilateral contacts."""
     if not _unilateral(lowering):
         return []
-    return numbered(slopes_and_growth(lowering, _onset, 2))
+    return [(place, value) for place, value in numbered(slopes_and_growth(lowering, _onset, 2)) if value != 0]
 
 
 def gap_slopes(lowering: Lowering) -> Rows:

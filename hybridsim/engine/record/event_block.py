@@ -24,7 +24,7 @@ def _taking_part(
     before: Any,
     after: Any,
     owner: Any,
-    has_surface: Any,
+    may_return: Any,
     due_start: Any,
     due: Any,
     recorded: Any,
@@ -33,6 +33,7 @@ def _taking_part(
     """Return the number of participants of some events, and the number of components among them.
 
     A participant is a component that changes its mode or is reset, a monitor, or a schedule that is due.
+    may_return (C,): whether an event of the component may leave its mode unchanged.
     due_start, due: the schedules of each kind of known time. recorded (2 M,): the directions, down and up, that each
     monitor records. participants (2, m): receives event and number of each, up to its length; monitors follow the
     components, and schedules follow the monitors.
@@ -42,7 +43,7 @@ def _taking_part(
     for e in range(fired.shape[0]):
         for c in range(components):
             is_owner = 0 <= fired[e] < guards and c == owner[fired[e]]
-            if before[e, c] != after[e, c] or (is_owner and not has_surface[c]):
+            if before[e, c] != after[e, c] or (is_owner and may_return[c]):
                 if count < participants.shape[1]:
                     participants[0, count], participants[1, count] = e, c
                 count += 1
@@ -125,8 +126,9 @@ class EventBlock(Sequence[Occurrence]):
         if due:
             kinds = np.cumsum([0, *map(len, due)]), np.array([k for one in due for k in one], dtype=np.int64)
         recorded = [m.direction in ("both", way) for m in system.model.monitors for way in _DIRECTIONS]
+        may_return = ~system.has_surface | system.is_unilateral  # a reset or an impact
         arrays = (
-            fired, before, after, system.owner, system.has_surface, *kinds, np.array(recorded, dtype=np.bool_)
+            fired, before, after, system.owner, may_return, *kinds, np.array(recorded, dtype=np.bool_)
         )  # fmt: skip
         self._count, self.changes, self._is_plain = _take_part(*arrays, participants)
         if self._count != len(fired):

@@ -77,9 +77,7 @@ class LoopCall(NamedTuple):
     times: np.ndarray  # (4,) target, and clock: the origin of the segment, which is advanced
     rates: np.ndarray  # (R,) rates of the angles
     scale: np.ndarray  # (n,) largest states on the segment
-    pace: (
-        np.ndarray
-    )  # (4,), see `is_crowded`, and at SINCE the time from the last event to the last known time after it
+    pace: np.ndarray  # (5,), see `is_crowded`, and at SINCE the time from the last event to the last known time after it
     known: Any  # `hybridsim.engine.events.compiled.known_time.KnownTimeArrays`
 
 
@@ -216,9 +214,9 @@ def event_loop(
         at, error, slope, bend, is_ahead = end.at, end.error, end.slope, end.bend, end.is_ahead
         state_errors(automata, error, y, scale, x_error, z, work.slopes, work.y_error)
         work.float_slots[SPREAD], work.int_slots[ROW] = spread(end.steps, STAGES), k
-        gap, ratio, steady = pace[0], pace[1], pace[2]
+        former = pace[0], pace[1], pace[2], pace[3]
         is_rejected = (
-            is_crowded(since + s, clock, pace)
+            is_crowded(since + s, clock, pace, automata.is_unilateral[index(automata.owner[fired])])
             or bound - s <= max(near, _NEAR_KNOWN * bound)
             or (
                 is_shallow(slope, bend, end.last_step)
@@ -228,7 +226,8 @@ def event_loop(
         if is_rejected or not resolve(model, at, error, fired, state, work):
             is_rejected, is_ahead = True, False  # the kernel of the segment returns STOPPED
             if work.int_slots[LACKS_TAPE] != 0:
-                pace[0], pace[1], pace[2], pace[SINCE] = gap, ratio, steady, since
+                pace[0], pace[1], pace[2], pace[3] = former
+                pace[SINCE] = since
             continue
         put(work.x_after, jumps[i, after])
         since = 0.0

@@ -170,7 +170,7 @@ class CallArrays:
                 times=np.zeros(4),
                 rates=np.zeros(layout.phases),
                 scale=np.empty(system.n),
-                pace=np.empty(4),
+                pace=np.empty(5),
                 known=known_time_arrays(system),
             )
         )

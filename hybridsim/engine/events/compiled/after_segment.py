@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from hybridsim.engine.events.compiled.guard_series import interpreted_series
+from hybridsim.engine.events.compiled.resolve_impact import resolve_impact
 from hybridsim.engine.events.compiled.resolve_ordinary import resolve_event
-from hybridsim.engine.events.compiled.scratch import AT, AT_ERROR, FIRED, NOBODY, RESOLVE, SERIES
+from hybridsim.engine.events.compiled.scratch import AT, AT_ERROR, FIRED, IMPACT, NOBODY, RESOLVE, SERIES
 from hybridsim.engine.events.zeno.accumulation import CLOSING_IN
 from hybridsim.engine.native.kernels import call_kernel, inlined, kernel, kernel_address
 from hybridsim.engine.native.loop_hints import index, short_loop
@@ -18,19 +19,30 @@ _SHALLOW = 2.0**-18  # least depth below zero, times four, relative to a guard's
 _HIDDEN = 16.0  # least depth below zero, times four, in rounding errors of the guard
 STAGES = 200.0  # the largest `rounding` of a method with a compiled loop
 _ULPS = 64.0  # events closer than this are left to the general mode loop
+# The same for impacts: an accumulation ends when its rest is 1024 ulps.
+_ULPS_OF_IMPACTS = 4096.0
+# A series that has shrunk by this factor and breaks off may have ended: ten times the factor of `Accumulation`.
+_FAR_DOWN = 1e-5
 
 
 @kernel
-def is_crowded(gap: float, clock: Any, pace: Any) -> bool:
+def is_crowded(gap: float, clock: Any, pace: Any, is_impact: bool) -> bool:
     """Return whether events follow each other so fast that a compiled loop has to stop.
 
-    gap: time since the last event. pace (3,): the gap before, its ratio to the one before that, and how often that
-    ratio was steady.
+    gap: time since the last event. pace (4,): the gap before, its ratio to the one before that, how often that ratio
+    was steady, and the longest gap since the gaps began to shrink. Impacts may accumulate in a compiled loop almost up
+    to their limit, since `hybridsim.engine.events.compiled.resolve_impact` notices when rounding may hide bounces. The
+    loop stops if such a series breaks off.
     """
     ratio = gap / pace[0]
     steady = ratio < CLOSING_IN and abs(ratio - pace[1]) <= _STEADY * ratio
+    breaks_off = ratio > 1.0 and pace[0] <= _FAR_DOWN * pace[3]
+    pace[3] = gap if ratio > 1.0 else max(pace[3], gap)
     pace[0], pace[1], pace[2] = gap, ratio, pace[2] + 1.0 if steady else 0.0
-    return pace[2] > 2.0 or gap <= _ULPS * 2.0**-52 * abs(clock[0])
+    ulp = 2.0**-52 * abs(clock[0])
+    if is_impact:
+        return breaks_off or gap <= _ULPS_OF_IMPACTS * ulp
+    return pace[2] > 2.0 or gap <= _ULPS * ulp
 
 
 @inlined
@@ -126,4 +138,8 @@ def link_event_resolution(model: Any, state: Any, work: Any) -> None:
     work.entry_points[SERIES] = kernel_address(
         interpreted_series, tapes, inputs, 0, 0.0, 0.0, x, x, state.p, work
     )
+    if automata.is_unilateral.any():
+        work.entry_points[IMPACT] = kernel_address(
+            resolve_impact, automata, tapes, inputs, lin, state, work, 0
+        )
     work.entry_points[RESOLVE] = kernel_address(resolve_event, automata, tapes, inputs, lin, state, work)

@@ -36,7 +36,7 @@ from hybridsim.engine.system.system import System
 # Indices of the integers of a loop, `LoopCall.int_slots`: three of them count committed steps and segments and known
 # times that were passed; the last says whether a call goes on with these.
 ORIGIN_AT, PHASES_AT, SIGNALS_AT, STEPS, SEGMENTS, KNOWN, IS_CONTINUED = range(7)
-SINCE = 3  # index of `LoopCall.pace`
+SINCE = 4  # index of `LoopCall.pace`
 NO_RESET = -1
 
 
@@ -83,7 +83,7 @@ def store_known_times(arrays: Any, known: KnownTimes, resets: np.ndarray) -> Non
 def begin_call(ints: Any, pace: Any, work: Any) -> None:
     """Prepare the counters of a call; they continue from the last call if IS_CONTINUED is set."""
     if ints[IS_CONTINUED] == 0:
-        pace[0], pace[1], pace[2], pace[SINCE] = math.inf, math.inf, 0.0, 0.0
+        pace[0], pace[1], pace[2], pace[3], pace[SINCE] = math.inf, math.inf, 0.0, 0.0, 0.0
         ints[STEPS] = ints[SEGMENTS] = ints[KNOWN] = 0
     ints[IS_CONTINUED] = work.int_slots[LACKS_TAPE] = 0
 

@@ -66,7 +66,7 @@ def resolve_clear(automata: Any, tapes: Any, lin: Any, state: Any, work: Any, fi
     for i in range(automata.cluster_start[c], automata.cluster_start[c + 1]):
         short_loop()
         d = index(automata.cluster[i])
-        if automata.is_unilateral[d] or (d != c and at.z[d] == automata.hold[d]):
+        if (d == c and automata.is_unilateral[d]) or (d != c and at.z[d] == automata.hold[d]):
             return False  # such components are decided together
     before = index(work.int_slots[ROW])
     x, x_error, trial = work.x_after, work.slopes, work.trial

@@ -2,7 +2,8 @@
 
 The rules are those of `hybridsim.engine.events.choice`. Other events are left unchanged for
 `hybridsim.engine.events.resolve`, which can report the reason: several guards at once, a case undecided at rounding, a
-cascade, no or several admissible motions, an impact, or an event in a model that also slides where it jumps.
+cascade, no or several admissible motions, or an event in a model that also slides where it jumps. An impact is resolved
+in `hybridsim.engine.events.compiled.resolve_impact`.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from hybridsim.engine.events.compiled.scratch import (
     DISCRETE,
     DISCRETE_AT,
     FIRED,
+    IMPACT,
     LACKS_TAPE,
     NOBODY,
     ROW,
@@ -29,7 +31,7 @@ from hybridsim.engine.events.compiled.scratch import (
 )
 from hybridsim.engine.linear.guard_coefficients import has_tables, linear_series, measure_point
 from hybridsim.engine.linear.motion import errors_of_time, functions_of_time
-from hybridsim.engine.native.kernels import call, inline_always, inlined
+from hybridsim.engine.native.kernels import call, call_kernel, inline_always, inlined
 from hybridsim.engine.native.loop_hints import put, short_loop
 from hybridsim.engine.series.bounded import UNIT
 from hybridsim.engine.system.programs.modes_index import find_modes
@@ -144,8 +146,9 @@ def resolve_ordinary(
             return -1
     c, back = automata.owner[fired], NOBODY
     for i in range(automata.cluster_start[c], automata.cluster_start[c + 1]):
-        if automata.is_unilateral[automata.cluster[i]]:
-            return -1
+        d = automata.cluster[i]
+        if automata.is_unilateral[d] and (d == c or at.z[d] == automata.hold[d]):
+            return -1  # contacts at their gaps are decided together, with impacts
     work.int_slots[ROW] = k
     if automata.hold[c] >= 0:
         if at.z[c] != automata.hold[c] and automata.place[fired] > 0:
@@ -181,6 +184,12 @@ def resolve_ordinary(
     return number if found == FINE else -1
 
 
+@inlined
+def closes_gap(automata: Any, c: int, fired: int, z: Any) -> bool:
+    """Return whether the fired guard is the gap of an open unilateral contact."""
+    return automata.is_unilateral[c] and automata.place[fired] == 0 and z[c] != automata.hold[c]
+
+
 def resolve_event(automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any, work: Any) -> int:
     """Resolve the event in the work space and replace the state; return 1, or 0 for other events.
 
@@ -204,7 +213,10 @@ def resolve_event(automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any, 
         work.on_surface[d] = False
     work.is_zero[fired] = True
     work.released_to[c] = automata.place[fired] if automata.hold[c] == state.z[c] else NO_SIDE
-    row = resolve_ordinary(automata, tapes, inputs, lin, state, work, fired)
+    if closes_gap(automata, c, fired, state.z):
+        row = call_kernel(work.entry_points[IMPACT], (automata, tapes, inputs, lin, state, work, fired))
+    else:
+        row = resolve_ordinary(automata, tapes, inputs, lin, state, work, fired)
     work.is_zero[fired] = False
     work.released_to[c] = NO_SIDE
     if row < 0:

@@ -19,7 +19,7 @@ from hybridsim.engine.system.programs.modes_index import find_modes
 MAX_JOINT_COMPONENTS = 3
 FIRED, DISCRETE, DISCRETE_AT, ROW, LACKS_TAPE = range(5)  # indices of `EventScratch.int_slots`
 AT, AT_ERROR, SPREAD = range(3)  # indices of `EventScratch.float_slots`
-RESOLVE, EVENT_LOOP, SERIES, KNOWN_TIME = range(4)  # indices of `EventScratch.entry_points`
+RESOLVE, EVENT_LOOP, SERIES, KNOWN_TIME, IMPACT = range(5)  # indices of `EventScratch.entry_points`
 NOBODY = -1  # no guard fired
 
 
@@ -31,6 +31,10 @@ class Functions(NamedTuple):
     jumps: Any
     choose: Any
     reset: Any
+    impulses: Any
+    restitutions: Any
+    surfaces: Any
+    gap_slopes: Any
 
 
 class LocatedEvent(NamedTuple):
@@ -50,8 +54,8 @@ class EventScratch(NamedTuple):
     The last ones, from `candidates` on, have a row for each joint candidate.
     """
 
-    functions: np.ndarray  # addresses (5,): `Functions`
-    entry_points: np.ndarray  # addresses (4,) of kernels at RESOLVE, EVENT_LOOP, SERIES, KNOWN_TIME
+    functions: np.ndarray  # addresses (9,): `Functions`
+    entry_points: np.ndarray  # addresses (5,) of kernels at RESOLVE, EVENT_LOOP, SERIES, KNOWN_TIME, IMPACT
     int_slots: np.ndarray  # integers at FIRED, DISCRETE, DISCRETE_AT, ROW, LACKS_TAPE
     missing: np.ndarray  # modes (C,) that have no instruction tape yet, if LACKS_TAPE is 1
     # numbers at AT, AT_ERROR, SPREAD (bounds by which simultaneous guards may be from zero)
@@ -96,7 +100,7 @@ class EventScratch(NamedTuple):
 def called_by(work: Any) -> Any:
     """Return the addresses of the model's functions that belong to a work space."""
     f = work.functions
-    return Functions(f[0], f[1], f[2], f[3], f[4])
+    return Functions(f[0], f[1], f[2], f[3], f[4], f[5], f[6], f[7], f[8])
 
 
 @inline_always
@@ -152,7 +156,7 @@ def work_space(system: Any, atoms: int = 0, monomials: int = 0) -> EventScratch:
     work: EventScratch = packed(
         EventScratch(
             functions=np.array(functions_of(system), dtype=np.int64 if ENABLED else object),
-            entry_points=numbers(4),
+            entry_points=numbers(5),
             int_slots=np.array(
                 [-1, len(system.model.discrete), system.layout.discrete_at, -1, 0], dtype=np.int64
             ),
@@ -176,7 +180,7 @@ def work_space(system: Any, atoms: int = 0, monomials: int = 0) -> EventScratch:
             judged=np.empty((2, guards, ORDER + 1)),
             decreed=numbers(guards),
             jumps=np.zeros(2 * max(len(system.surface_of), 1)),
-            out=np.zeros(max(system.n + len(system.model.discrete), 1)),
+            out=np.zeros(max(system.n + len(system.model.discrete), size_for_impacts(system), 1)),
             everything=np.arange(count, dtype=np.int64),
             members=numbers(together),
             current=numbers(together),
@@ -194,6 +198,12 @@ def work_space(system: Any, atoms: int = 0, monomials: int = 0) -> EventScratch:
     return work
 
 
+def size_for_impacts(system: Any) -> int:
+    """Return the size of the outputs of `impulses` and `gap_slopes` together, or 0 without unilateral contacts."""
+    surfaces = len(system.surface_of)
+    return surfaces * (3 * system.n + 2 * surfaces) if system.is_unilateral.any() else 0
+
+
 def _atoms(count: int) -> np.ndarray:
     """Return an array for the values and errors of `count` functions of time, and of the constant 1."""
     factors = np.zeros((2 * count + 1, 2))
@@ -206,6 +216,8 @@ def functions_of(system: Any) -> Functions:
     """Return the addresses of the functions that a compiled loop calls."""
     has_surface = any(a.has_surface for a in system.automata)
     has_choice = any(not a.has_surface for a in system.automata)
+    has_impact = bool(system.is_unilateral.any())
+    has_curved_gap = bool(system.is_unilateral[list(system.projected)].any())
     none: Any = system.address("flow")  # never called
     return Functions(
         system.address("flow"),
@@ -213,4 +225,6 @@ def functions_of(system: Any) -> Functions:
         system.address("jumps") if has_surface else none,
         system.address("choose") if has_choice else none,
         system.address("reset") if has_choice or system.model.schedules else none,
+        *(system.address(name) if has_impact else none for name in ("impulses", "restitutions")),
+        *(system.address(name) if has_curved_gap else none for name in ("surfaces", "gap_slopes")),
     )

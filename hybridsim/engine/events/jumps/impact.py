@@ -16,7 +16,7 @@ from hybridsim.model.parts.impact import ROUNDING
 
 # The error of location is rounding, so one Newton correction makes the gap zero within rounding. The second correction
 # is for steps that end slightly inside.
-_CORRECTIONS = 2
+CORRECTIONS = 2
 
 Failure = tuple[str, str]
 
@@ -262,7 +262,7 @@ class _Collision:
         free = at.p.copy()
         free[system.layout.pin_at] = 0.0
         rows = [self.place[c] for c in projected]
-        for _ in range(_CORRECTIONS):
+        for _ in range(CORRECTIONS):
             gaps = system.series(at.s, x, free, z, at.x_error, at.s_error, at.is_put).surfaces[rows, 0]
             slopes = system.gap_slopes(at.s, x, free, z)[rows]
             if not (np.isfinite(gaps).all() and np.isfinite(slopes).all()):

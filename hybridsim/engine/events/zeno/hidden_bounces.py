@@ -26,7 +26,7 @@ from hybridsim.engine.system.instant import Instant
 from hybridsim.engine.system.system import Automaton, System
 
 _STRIDE = 1.5  # ratio of the speeds of the examined bounces
-_LEAST_LOSS = 1e-4  # least relative loss of speed in a bounce; less means over 10**4 bounces per digit
+LEAST_LOSS = 1e-4  # least relative loss of speed in a bounce; less means over 10**4 bounces per digit
 _AGREEING_BOUNCES = 2  # bounces that have to agree if they are not impacts of a declared law
 
 
@@ -112,7 +112,7 @@ def _barely_seen(system: System, outcome: Outcome, bounces: dict[int, Bounce]) -
         if automaton.is_corner or rests or (automaton.has_surface and not automaton.is_unilateral):
             continue
         departure = _departure(system, outcome, c, last)
-        if departure is not None and departure.unknown >= _LEAST_LOSS:
+        if departure is not None and departure.unknown >= LEAST_LOSS:
             found[c] = departure
     return found
 
