@@ -295,3 +295,46 @@ def test_friction_beside_an_open_stop(method, no_general_segments):
 @pytest.mark.parametrize("mu", [0.05, 0.4])
 def test_friction_and_a_stop_both_ways(method, mu, monkeypatch):
     assert_same_both_ways(rubbed(mu), (0, 40), method, monkeypatch)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_block_that_slides_between_two_walls_until_it_sticks(method, no_general_segments):
+    """Friction takes a v^2 of 2 a L on each way, and a wall turns the friction over."""
+    a, e, start = 0.7, 0.9, 4.0
+    block = hs.Model(
+        "block",
+        states=[hs.State("x", 0, der="v"), hs.State("v", start, der="p - q - f")],
+        contacts=[hs.Contact("f", "v", "1", "coulomb", {"mu": a})],
+        impacts=[hs.Impact("p", "x + 1", restitution=e), hs.Impact("q", "1 - x", restitution=e)],
+    )
+    solution = hs.simulate(block, (0, 30), integrator=method, rtol=1e-12)
+    t, v, way, times = 0.0, start, 1.0, []
+    while v * v > 2 * a * way:
+        arrival = math.sqrt(v * v - 2 * a * way)
+        t, v, way = t + (v - arrival) / a, e * arrival, 2.0
+        times.append(t)
+    assert len(times) > 3
+    turns = [
+        ("gap", "open", "open"),
+        ("reset", "slip+", "slip-"),
+        ("gap", "open", "open"),
+        ("reset", "slip-", "slip+"),
+    ]
+    expected = (turns * len(times))[: 2 * len(times)]
+    expected.append(("velocity", "slip+" if len(times) % 2 == 0 else "slip-", "stick"))
+    assert [(event.guard, event.source, event.target) for event in solution.events] == expected
+    assert [event.component for event in solution.events[:4]] == ["q", "f", "p", "f"]
+    assert solution.event_times("f")[:-1] == pytest.approx(times, rel=1e-10)
+    assert solution.events[-1].t == pytest.approx(t + v / a, rel=1e-10)
+    assert abs(solution.y[0, -1]) == pytest.approx(abs(v * v / (2 * a) - 1), rel=1e-9)
+
+
+@pytest.mark.parametrize("method", ["taylor", "dop853"])
+def test_a_drag_whose_side_turns_over_at_an_impact(method, monkeypatch):
+    dragged = hs.Model(
+        "dragged",
+        states=[hs.State("x", 0, der="v"), hs.State("v", 0, der="1.5*cos(0.7*t) - x - 0.1*v*abs(v) + p - f")],
+        impacts=[hs.Impact("p", "x + 1", restitution=0.8)],
+        contacts=[hs.Contact("f", "v", "1", "coulomb", {"mu": 0.05})],
+    )
+    assert_same_both_ways(dragged, (0, 20), method, monkeypatch)

@@ -75,7 +75,7 @@ def take_corners(resolution: EventData) -> bool:
         automaton, mode = system.automata[c], int(before[c])
         resolution.fired[list(automaton.guards[mode])] = False
         resolution.changes.append(
-            Change(c, _guard_towards(automaton, mode, int(z[c])), mode, int(z[c]), at.x, at.x)
+            Change(c, automaton.guard_towards(mode, int(z[c])), mode, int(z[c]), at.x, at.x)
         )
         if automaton.is_corner:
             resolution.is_kinked = True
@@ -87,11 +87,3 @@ def take_corners(resolution: EventData) -> bool:
         at.z = at.z.copy()
         at.z[changed] = z[changed]
     return bool(changed)
-
-
-def _guard_towards(automaton: Automaton, mode: int, target: int) -> str:
-    """Return the name of the guard that leads from one mode to another, directly or through other modes."""
-    for name, targets in zip(automaton.guard_names[mode], automaton.targets[mode], strict=True):
-        if (targets[0] > mode) == (target > mode):
-            return name
-    return ""

@@ -10,7 +10,7 @@ from hybridsim.engine.events.choice.verdict import NO_SIDE
 from hybridsim.engine.events.outcome import Change, Situation
 from hybridsim.engine.series.short_series import Series
 from hybridsim.engine.system.programs.mode_tables import automata_of
-from hybridsim.engine.system.system import System
+from hybridsim.engine.system.system import RESET, System
 
 
 class EventData:
@@ -101,7 +101,7 @@ class EventData:
             side = automaton.above if value > 0.0 else automaton.below
             self.fired[automaton.guards[side][0]] = False  # it was located at its surface before the reset
             if at.z[c] not in (-1, side):
-                self.changes.append(Change(c, "reset", int(at.z[c]), side, at.x, at.x))
+                self.changes.append(Change(c, RESET, int(at.z[c]), side, at.x, at.x))
             at.z[c] = side
 
     def pinned_states(self, components: list[int]) -> np.ndarray:

@@ -13,7 +13,7 @@ import numpy as np
 from hybridsim.engine.native.kernels import Precompiled, kernel
 from hybridsim.engine.record.segments import Occurrence
 from hybridsim.engine.system.instant import Instant
-from hybridsim.engine.system.system import System
+from hybridsim.engine.system.system import RESET, System
 
 AT_KNOWN_TIME = -2  # kind k of a known time is AT_KNOWN_TIME - k in place of a guard
 
@@ -41,9 +41,13 @@ def _taking_part(
     count, others, is_plain = 0, 0, True
     components, guards, monitors = before.shape[1], owner.shape[0], recorded.shape[0] // 2
     for e in range(fired.shape[0]):
+        first = owner[fired[e]] if 0 <= fired[e] < guards and may_return[owner[fired[e]]] else components
+        if first < components:  # its reset or impact precedes the changes that follow from it
+            if count < participants.shape[1]:
+                participants[0, count], participants[1, count] = e, first
+            count += 1
         for c in range(components):
-            is_owner = 0 <= fired[e] < guards and c == owner[fired[e]]
-            if before[e, c] != after[e, c] or (is_owner and may_return[c]):
+            if before[e, c] != after[e, c] and c != first:
                 if count < participants.shape[1]:
                     participants[0, count], participants[1, count] = e, c
                 count += 1
@@ -202,6 +206,12 @@ class EventBlock(Sequence[Occurrence]):
             events = events[~self._system.is_corner[components]]
         return self._instants[events], self._states[events]
 
+    def changes_of_components(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the instants (k, 2) at which components change their modes or are reset, and the components (k,)."""
+        events, components = self._participants
+        is_change = components < len(self._system.automata)
+        return self._instants[events[is_change]], components[is_change]
+
     def since(self, first: int) -> EventBlock:
         """Return a block of the events, starting with the event of a given number."""
         later = copy(self)
@@ -255,6 +265,8 @@ class EventBlock(Sequence[Occurrence]):
         automaton, guard, modes = automata[component], "", automata[component].modes
         if 0 <= fired < len(self._system.owner) and component == self._system.owner[fired]:
             guard = automaton.guard_names[source][automaton.guards[source].index(fired)]
+        elif 0 <= fired < len(self._system.owner) and self._system.is_unilateral[self._system.owner[fired]]:
+            guard = RESET if automaton.has_surface else automaton.guard_towards(source, target)
         return Occurrence(
             at, automaton.kind, automaton.name, guard, modes[source], modes[target], -1, x_minus, x_plus
         )

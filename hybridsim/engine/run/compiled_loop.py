@@ -246,9 +246,7 @@ class CompiledLoop:
             self.renew()
         may_continue = run.is_full or run.lacks_tapes
         end = ARRIVED if run.is_at_target else PAUSED if may_continue else BEFORE_SOMETHING
-        return LoopResult(
-            Instant(*run.clock), run.outcome, end, run.instants, run.owners, run.adopted, run.known_passed
-        )
+        return LoopResult(Instant(*run.clock), run.outcome, end, *run.changes, run.adopted, run.known_passed)
 
     def count(self, run: KernelRun, counters: Counters) -> None:
         """Add the cost of one call to the counters of the run."""

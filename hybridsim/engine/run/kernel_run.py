@@ -55,8 +55,8 @@ def skipped_rows(first: int, steps: int, count: int) -> tuple[int, ...]:
 class LoopResult(NamedTuple):
     """The end of a compiled call: the origin and the state of the next segment, and the reason for the end.
 
-    end: ARRIVED at the target, PAUSED because the arrays are full, or BEFORE_SOMETHING that is not ordinary. instants
-    (E, 2): instants of the events. owners (E,): the components whose guards fired. outcome: makes the state on demand.
+    end: ARRIVED at the target, PAUSED because the arrays are full, or BEFORE_SOMETHING that is not ordinary. instants,
+    owners: see `KernelRun.changes`. outcome: makes the state on demand.
     adopted: the last instant at which anything was resolved. passed: the known times on the way.
     """
 
@@ -154,9 +154,14 @@ class KernelRun:
         return found if self._has_guards_alone else found[self._have_fired]
 
     @property
-    def owners(self) -> np.ndarray:
-        """Return the components (E,) whose guards fired."""
-        return self.system.owner[self.fires]
+    def changes(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the instants (E, 2) at which components changed their modes or were reset, and the components (E,).
+
+        An impact also changes the sides of contacts whose guards have not fired.
+        """
+        if self.system.is_unilateral.any() and self.event_block is not None:
+            return self.event_block.changes_of_components()
+        return self.instants, self.system.owner[self.fires]
 
     @property
     def adopted(self) -> Instant | None:

@@ -30,6 +30,7 @@ from hybridsim.model.smoothing.steps_in_time import constant_inputs
 from hybridsim.model.toml.automata import SINGLE
 
 CORNER = "corner"  # kind of the event in which a corner changes its side
+RESET = "reset"  # named in place of a guard if a reset or an impact changes the side of a contact
 
 
 @dataclass(frozen=True)
@@ -67,6 +68,13 @@ class Automaton:
     def has_surface(self) -> bool:
         """Return whether the component has a surface, and a mode that holds it."""
         return self.hold >= 0
+
+    def guard_towards(self, mode: int, target: int) -> str:
+        """Return the name of the guard that leads from one mode to another, directly or through other modes."""
+        for name, targets in zip(self.guard_names[mode], self.targets[mode], strict=True):
+            if (targets[0] > mode) == (target > mode):
+                return name
+        return ""
 
 
 def _automaton(component: Any, guards: tuple[tuple[int, ...], ...]) -> Automaton:

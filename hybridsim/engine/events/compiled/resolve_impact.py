@@ -13,8 +13,8 @@ from typing import Any
 
 from hybridsim.engine.events.choice.verdict import FINE, value_of
 from hybridsim.engine.events.compiled.guard_series import guard_series
-from hybridsim.engine.events.compiled.resolve_surface import cluster_of, row_verdict
-from hybridsim.engine.events.compiled.scratch import SPREAD, called_by, located
+from hybridsim.engine.events.compiled.resolve_surface import SURFACE_MODES, cluster_of, row_verdict
+from hybridsim.engine.events.compiled.scratch import ROW, SPREAD, called_by, located
 from hybridsim.engine.events.jumps.impact import CORRECTIONS
 from hybridsim.engine.events.zeno.hidden_bounces import LEAST_LOSS
 from hybridsim.engine.linear.guard_coefficients import has_tables, linear_coefficient, measure_point
@@ -146,7 +146,33 @@ def _apply(automata: Any, functions: Any, at: Any, c: int, impulse: float, work:
 
 
 @inlined
-def _is_clear_after(automata: Any, tapes: Any, lin: Any, k: int, fired: int, work: Any) -> bool:
+def _set_sides(automata: Any, tapes: Any, lin: Any, k: int, fired: int, work: Any) -> int:
+    """Write to `trial` the sides of slipping contacts and corners after an impact, and return the row of these modes.
+
+    k: row of the modes before. The result is -1 if a side is uncertain, or if a guard of another kind is negative.
+    """
+    trial, row = work.trial, k
+    for i in range(tapes.active_start[k], tapes.active_start[k + 1]):
+        g = tapes.active[i]
+        value, bound = value_of(lin, k, g, work)
+        if g == fired or value > bound:
+            continue
+        d, place = automata.owner[g], automata.place[g]
+        hold = automata.hold[d]
+        if not value < -bound or automata.is_monitor[d] or automata.is_unilateral[d]:
+            return -1
+        if automata.is_corner[d]:
+            trial[d] = automata.target[d, trial[d], place, 0]
+        elif hold >= 0 and place == 0 and trial[d] != hold:
+            trial[d] = SURFACE_MODES - hold - trial[d]  # the numbers are 0, 1 and 2
+        else:
+            return -1
+        row = -1
+    return row if row >= 0 else find_modes(tapes, trial)
+
+
+@inlined
+def _is_clear_after(tapes: Any, lin: Any, k: int, fired: int, work: Any) -> bool:
     """Return whether the gap opens at a certain speed, and all other guards are away from zero after the impact."""
     for i in range(tapes.active_start[k], tapes.active_start[k + 1]):
         g = tapes.active[i]
@@ -161,8 +187,9 @@ def _is_clear_after(automata: Any, tapes: Any, lin: Any, k: int, fired: int, wor
 def resolve_impact(
     automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any, work: Any, fired: int
 ) -> int:
-    """Compute the states after the impact of the component whose gap closes, in unchanged modes.
+    """Compute the states and the modes after the impact of the component whose gap closes.
 
+    The modes are unchanged, except for the sides of corners and of slipping contacts whose velocities the impact turns.
     Return the row with sides, orders and floors of the guards, or -1 if the general loop has to resolve the impact.
     """
     functions, at, k = called_by(work), located(state, work), find_modes(tapes, state.z)
@@ -189,5 +216,11 @@ def resolve_impact(
             return -1
     measure_point(lin, work)
     guard_series(tapes, inputs, lin, k, at, x, x_error, work)
-    found = row_verdict(automata, lin, k, at.z, work.everything, False, 0, work)
-    return 0 if found == FINE and _is_clear_after(automata, tapes, lin, k, fired, work) else -1
+    row = _set_sides(automata, tapes, lin, k, fired, work)
+    if row < 0:
+        return -1
+    if row != k:
+        guard_series(tapes, inputs, lin, row, at, x, x_error, work)
+    work.int_slots[ROW] = row
+    found = row_verdict(automata, lin, row, work.trial, work.everything, False, 0, work)
+    return 0 if found == FINE and _is_clear_after(tapes, lin, row, fired, work) else -1

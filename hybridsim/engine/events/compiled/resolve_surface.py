@@ -20,7 +20,7 @@ from hybridsim.engine.native.kernels import call, call_noinline, inline_always, 
 from hybridsim.engine.native.loop_hints import put, short_loop
 from hybridsim.engine.series.bounded import UNIT
 
-_MODES = 3  # modes of a surface
+SURFACE_MODES = 3  # modes of a surface
 
 
 @inline_always
@@ -68,12 +68,12 @@ def choose_modes(
     """
     members, candidates, trial, ranks = work.members, work.candidates, work.trial, work.ranks
     cluster = cluster_of(automata, members[0])
-    total, chosen, score, found = _MODES**count, NONE, NO_SCORE, LEAVES
+    total, chosen, score, found = SURFACE_MODES**count, NONE, NO_SCORE, LEAVES
     for number in range(total):
         rest = number
         for i in range(count - 1, -1, -1):
-            candidates[number, i] = rest % _MODES
-            rest //= _MODES
+            candidates[number, i] = rest % SURFACE_MODES
+            rest //= SURFACE_MODES
     rank_candidates(candidates, total, count, work.current, work.holds, work.keeps, ranks)
     for rank in range((count + 1) * (count + 1) - 1, -1, -1):
         if is_settled(score, rank, count):
