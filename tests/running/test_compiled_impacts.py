@@ -38,7 +38,7 @@ def assert_same_both_ways(model, span, method, monkeypatch, **options):
         patch.setattr(mode_loop, "SegmentRun", lambda *args: segments.append(args) or segment_run(*args))
         # a copy, because a known model keeps its compiled loop
         general = hs.simulate(replace(model), span, integrator=method, rtol=1e-11, **options)
-    assert 2 * len(segments) > len(general.events)
+    assert 2 * len(segments) > sum(event.guard == "gap" for event in general.events)
     kinds = [
         [(e.kind, e.component, e.guard, e.source, e.target, e.direction) for e in sol.events]
         for sol in (compiled, general)
@@ -338,3 +338,46 @@ def test_a_drag_whose_side_turns_over_at_an_impact(method, monkeypatch):
         contacts=[hs.Contact("f", "v", "1", "coulomb", {"mu": 0.05})],
     )
     assert_same_both_ways(dragged, (0, 20), method, monkeypatch)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_monitors_that_an_impact_carries_over_zero(method, no_general_segments):
+    """The velocity jumps up at each blow and falls through zero at each apex; one monitor records only the blows."""
+    model = replace(
+        ball(1),
+        monitors=(
+            hs.Monitor("apex", "w", direction="down"),
+            hs.Monitor("blow", "w + 0.25", direction="up"),
+            hs.Monitor("both", "w - 1"),
+        ),
+    )
+    solution = hs.simulate(model, (0, 9.9 * FALL), integrator=method, rtol=1e-11)
+    blows = FALL * np.arange(1, 10, 2)
+    assert solution.event_times("blow") == pytest.approx(blows, rel=1e-9)
+    assert solution.event_times("p") == pytest.approx(blows, rel=1e-9)
+    assert solution.event_times("apex") == pytest.approx(FALL * np.arange(2, 10, 2), rel=1e-9)
+    slower = FALL * np.arange(2, 10, 2) - 1 / G
+    assert solution.event_times("both") == pytest.approx(
+        np.sort([*blows, *slower, 10 * FALL - 1 / G]), rel=1e-9
+    )
+    first = [(e.kind, e.component, e.direction) for e in solution.events if e.t < 1.5 * FALL]
+    assert first == [("transition", "p", -1), ("monitor", "blow", 1), ("monitor", "both", 1)]
+    assert {e.direction for e in solution.events if e.component == "apex"} == {-1}
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_monitors_and_impacts_both_ways(method, monkeypatch):
+    monitors = (
+        hs.Monitor("way", "v", direction="up"), hs.Monitor("fast", "v - 0.5"),
+        hs.Monitor("place", "x - 0.2", direction="down"), hs.Monitor("power", "2*v + x"),
+    )  # fmt: skip
+    assert_same_both_ways(replace(rubbed(0.05), monitors=monitors), (0, 20), method, monkeypatch)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_monitor_ends_the_run_at_an_impact(method):
+    model = replace(ball(1), monitors=(hs.Monitor("blow", "w", direction="up", action="terminate"),))
+    solution = hs.simulate(model, (0, 5), integrator=method, rtol=1e-11)
+    assert solution.status == "terminated"
+    assert solution.t_end == pytest.approx(FALL, rel=1e-10)
+    assert [e.component for e in solution.events] == ["p", "blow"]

@@ -80,15 +80,6 @@ class MonitorCorners:
         self._guards = numbers.reshape(self.count, 2)  # of each monitor in its two modes
         assert self.system.layout == plain.layout and np.array_equal(self.system.rates, plain.rates)
 
-    def numbered(self, fires: np.ndarray, modes: np.ndarray) -> np.ndarray:
-        """Return the numbers of the guards that fired; each monitor has two numbers, one for each direction."""
-        own, components = self.plain.guard_count, len(self.plain.automata)
-        events = np.flatnonzero(fires >= own)
-        corners = self.system.owner[fires[events]]
-        numbers = fires.copy()
-        numbers[events] = own + 2 * (corners - components) + modes[events, corners]
-        return numbers
-
     def state(self, outcome: Outcome, p: np.ndarray) -> HybridState | None:
         """Return the state with a corner for each monitor, or None if a monitor is zero or not a number."""
         if not outcome.monitor_sides.all():

@@ -33,13 +33,14 @@ def _taking_part(
     """Return the number of participants of some events, and the number of components among them.
 
     A participant is a component that changes its mode or is reset, a monitor, or a schedule that is due.
-    may_return (C,): whether an event of the component may leave its mode unchanged.
+    may_return (C,): whether an event of the component may leave its mode unchanged. before, after (E, C) or (E, C + M):
+    modes of the components, and of the corners of monitors if there are any.
     due_start, due: the schedules of each kind of known time. recorded (2 M,): the directions, down and up, that each
     monitor records. participants (2, m): receives event and number of each, up to its length; monitors follow the
     components, and schedules follow the monitors.
     """
     count, others, is_plain = 0, 0, True
-    components, guards, monitors = before.shape[1], owner.shape[0], recorded.shape[0] // 2
+    components, guards, monitors = may_return.shape[0], owner.shape[0], recorded.shape[0] // 2
     for e in range(fired.shape[0]):
         first = owner[fired[e]] if 0 <= fired[e] < guards and may_return[owner[fired[e]]] else components
         if first < components:  # its reset or impact precedes the changes that follow from it
@@ -51,11 +52,11 @@ def _taking_part(
                 if count < participants.shape[1]:
                     participants[0, count], participants[1, count] = e, c
                 count += 1
-        if fired[e] >= guards and recorded[fired[e] - guards]:
-            if count < participants.shape[1]:
-                participants[0, count] = e
-                participants[1, count] = components + (fired[e] - guards) // 2
-            count, others = count + 1, others + 1
+        for m in range(components, before.shape[1]):
+            if before[e, m] != after[e, m] and recorded[2 * (m - components) + before[e, m]]:
+                if count < participants.shape[1]:
+                    participants[0, count], participants[1, count] = e, m
+                count, others = count + 1, others + 1
         if fired[e] <= AT_KNOWN_TIME:
             kind = AT_KNOWN_TIME - fired[e]
             for i in range(due_start[kind], due_start[kind + 1]):
@@ -91,7 +92,7 @@ def _states_at(states: Any, participants: Any, first: int, component: int, side:
 
 
 SCHEDULED, MONITOR = "scheduled", "monitor"  # kinds of the events of schedules and monitors
-_DIRECTIONS = ("down", "up")  # of the two guards of a monitor
+_DIRECTIONS = ("down", "up")  # in which a monitor leaves the two modes of its corner
 _NO_KINDS = np.zeros(1, dtype=np.int64), np.zeros(0, dtype=np.int64)  # of known times, as arrays
 _take_part, _times_of_one = Precompiled(_taking_part), Precompiled(_times_at)
 
@@ -104,9 +105,10 @@ class EventBlock(Sequence[Occurrence]):
     Parameters
     ----------
     instants : (E, 2), high and low.
-    fired : (E,), number of the guard that fired; -1 for none; AT_KNOWN_TIME - k for kind k of a known time. Beyond the
-        guards of the components, each monitor has two numbers, for its directions down and up.
-    before, after : (E, C), modes on both sides.
+    fired : (E,), number of the guard that fired; -1 for none; AT_KNOWN_TIME - k for kind k of a known time. The guards
+        of the corners of monitors follow those of the components.
+    before, after : (E, C) or (E, C + M), modes on both sides. Those of the corners of monitors are 0 while a monitor
+        is positive, and 1 while it is negative.
     states : (E, 2, n), x- and x+.
     due : the schedules of each kind of known time.
     """
@@ -259,8 +261,7 @@ class EventBlock(Sequence[Occurrence]):
         at, automata = Instant(*instant), self._system.automata
         if component >= len(automata):
             name, kind = self._named[component]
-            is_up = (fired - len(self._system.owner)) % 2 == 1
-            direction = 0 if kind == SCHEDULED else 1 if is_up else -1
+            direction = 0 if kind == SCHEDULED else 1 if source == 1 else -1
             return Occurrence(at, kind, name, "", "", "", direction, x_minus, x_plus)
         automaton, guard, modes = automata[component], "", automata[component].modes
         if 0 <= fired < len(self._system.owner) and component == self._system.owner[fired]:

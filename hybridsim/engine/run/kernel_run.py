@@ -211,16 +211,13 @@ class KernelRun:
         """Return the events as one block, or None if there are none."""
         if self._event_block is None and self.events:
             modes, ended = self._array("modes"), self._ended
-            fires = self._fires[ended]
-            if self.corners is not None:
-                fires = self.corners.numbered(fires, modes[ended])
             after = slice(ended.start + 1, ended.stop + 1)
             self._event_block = EventBlock(
                 self.system,
                 self._array("clocks")[after],
-                fires,
-                self.plain_modes(modes[ended]),
-                self.plain_modes(modes[after]),
+                self._fires[ended],
+                modes[ended],
+                modes[after],
                 self._array("jumps")[ended, -2:],  # the states at its end, after the state at its start
                 self.known.due if self.known is not None and self.passed else (),
             )

@@ -149,7 +149,8 @@ def _apply(automata: Any, functions: Any, at: Any, c: int, impulse: float, work:
 def _set_sides(automata: Any, tapes: Any, lin: Any, k: int, fired: int, work: Any) -> int:
     """Write to `trial` the sides of slipping contacts and corners after an impact, and return the row of these modes.
 
-    k: row of the modes before. The result is -1 if a side is uncertain, or if a guard of another kind is negative.
+    The corners are also those of monitors. k: row of the modes before. The result is -1 if a side is uncertain, if a
+    monitor acts, or if a guard of another kind is negative.
     """
     trial, row = work.trial, k
     for i in range(tapes.active_start[k], tapes.active_start[k + 1]):
@@ -159,9 +160,9 @@ def _set_sides(automata: Any, tapes: Any, lin: Any, k: int, fired: int, work: An
             continue
         d, place = automata.owner[g], automata.place[g]
         hold = automata.hold[d]
-        if not value < -bound or automata.is_monitor[d] or automata.is_unilateral[d]:
+        if not value < -bound or automata.is_unilateral[d]:
             return -1
-        if automata.is_corner[d]:
+        if automata.is_corner[d] and automata.target[d, trial[d], place, 0] >= 0:
             trial[d] = automata.target[d, trial[d], place, 0]
         elif hold >= 0 and place == 0 and trial[d] != hold:
             trial[d] = SURFACE_MODES - hold - trial[d]  # the numbers are 0, 1 and 2
@@ -189,7 +190,7 @@ def resolve_impact(
 ) -> int:
     """Compute the states and the modes after the impact of the component whose gap closes.
 
-    The modes are unchanged, except for the sides of corners and of slipping contacts whose velocities the impact turns.
+    The modes are unchanged, except for the sides of corners, monitors and slipping contacts that the impact turns over.
     Return the row with sides, orders and floors of the guards, or -1 if the general loop has to resolve the impact.
     """
     functions, at, k = called_by(work), located(state, work), find_modes(tapes, state.z)
