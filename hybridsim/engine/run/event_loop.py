@@ -77,7 +77,8 @@ class LoopCall(NamedTuple):
     times: np.ndarray  # (4,) target, and clock: the origin of the segment, which is advanced
     rates: np.ndarray  # (R,) rates of the angles
     scale: np.ndarray  # (n,) largest states on the segment
-    pace: np.ndarray  # (5,), see `is_crowded`, and at SINCE the time from the last event to the last known time after it
+    # (5,), see `is_crowded`, and at SINCE the time from the last event to the last known time after it
+    pace: np.ndarray
     known: Any  # `hybridsim.engine.events.compiled.known_time.KnownTimeArrays`
 
 

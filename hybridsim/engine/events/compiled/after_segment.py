@@ -29,7 +29,7 @@ _FAR_DOWN = 1e-5
 def is_crowded(gap: float, clock: Any, pace: Any, is_impact: bool) -> bool:
     """Return whether events follow each other so fast that a compiled loop has to stop.
 
-    gap: time since the last event. pace (4,): the gap before, its ratio to the one before that, how often that ratio
+    gap: time since the last event. pace (5,): the gap before, its ratio to the one before that, how often that ratio
     was steady, and the longest gap since the gaps began to shrink. Impacts may accumulate in a compiled loop almost up
     to their limit, since `hybridsim.engine.events.compiled.resolve_impact` notices when rounding may hide bounces. The
     loop stops if such a series breaks off.

@@ -14,7 +14,7 @@ from typing import Any
 from hybridsim.engine.events.choice.verdict import FINE, value_of
 from hybridsim.engine.events.compiled.guard_series import guard_series
 from hybridsim.engine.events.compiled.resolve_surface import SURFACE_MODES, cluster_of, row_verdict
-from hybridsim.engine.events.compiled.scratch import ROW, SPREAD, called_by, located
+from hybridsim.engine.events.compiled.scratch import ROW, SPREAD, called_by, located, row_of
 from hybridsim.engine.events.jumps.impact import CORRECTIONS
 from hybridsim.engine.events.zeno.hidden_bounces import LEAST_LOSS
 from hybridsim.engine.linear.guard_coefficients import has_tables, linear_coefficient, measure_point
@@ -169,7 +169,7 @@ def _set_sides(automata: Any, tapes: Any, lin: Any, k: int, fired: int, work: An
         else:
             return -1
         row = -1
-    return row if row >= 0 else find_modes(tapes, trial)
+    return row if row >= 0 else row_of(tapes, trial, work)
 
 
 @inlined
