@@ -91,13 +91,13 @@ class Ensemble:
         vectors = np.zeros((len(parameters), layout.size))
         vectors[:, : layout.parameters] = parameters
         vectors[:, layout.pin_at] = 1.0
-        rates = np.array([system.rates_at(p) for p in vectors]).reshape(len(vectors), -1)
+        rates = np.array([system.rates_at(p) for p in vectors]).reshape(len(vectors), -1, 2)
         known: dict[bytes, float] = {}
         for row in rates:
             if (key := row.tobytes()) not in known:
-                known[key] = _period(row)
+                known[key] = _period(row[:, 0])
         times = np.array([known[row.tobytes()] for row in rates])
-        fastest = np.abs(rates).max(axis=1, initial=0.0)
+        fastest = np.abs(rates[:, :, 0]).max(axis=1, initial=0.0)
         with np.errstate(divide="ignore", invalid="ignore"):
             longest = _RENEWAL_TURNS * _FULL_TURN / fastest
             horizons = np.minimum(periods * times, longest)

@@ -42,7 +42,7 @@ class Points(NamedTuple):
 
     tables: np.ndarray  # addresses (m,) of tables
     vectors: np.ndarray  # run-time vectors (m, P)
-    rates: np.ndarray  # rates (m, R) of angles
+    rates: np.ndarray  # rates (m, R, 2) of angles: numbers and rests
     starts: np.ndarray  # initial states (m, n)
     periods: np.ndarray  # forcing periods (m,)
     longest: np.ndarray  # longest segments (m,)
@@ -98,7 +98,8 @@ def begin_point(packs: Any, none: Any, fixed: Any, points: Any, found: Any, i: i
     if keeps_holding(model.tapes, lin, state, work, own.c):
         _take_rest(fixed.hold, points.periods[i], state, found)
         return RESTS
-    put(rates, call.rates)
+    for r in range(rates.shape[0]):
+        put(rates[r], call.rates[r])
     for k in range(own.hints.shape[0]):
         fill(own.hints[k], 0.0)
     call.longest[0] = points.longest[i]

@@ -37,6 +37,7 @@ class Program:
     pins: dict[int, tuple[int, ...]]  # component -> indices of the states that its holding mode evaluates
     projected: dict[int, tuple[int, ...]]  # component -> indices of the states that its holding mode projects
     rates: list[Any]  # SymPy, parameters only
+    periods: dict[int, Any]  # rate -> period of the wave to which it belongs, SymPy
     clusters: list[list[int]]  # surface components whose unknowns act on each other's surface
     stop_couplings: list[StopCoupling]  # gaps with friction contacts along them
     jumps: list[tuple[int, Any, Any]]  # (component, jump above, jump below)
@@ -64,6 +65,16 @@ class Lowering(LoweringState):
             return c[0]
         if kind == "table" or (kind == "wave" and self.model.inputs[index].shape != "sine"):
             return c[0] + d * (c[1] + d * (c[2] + d * c[3]))
+        if kind == "wave":
+            expressions = declared.expressions
+            offset, amplitude, period = (
+                self.convert(expressions[n]) for n in ("offset", "amplitude", "period")
+            )
+            angle = 2 * sp.pi * self.t / period
+            value = self._local_angles(offset + amplitude * sp.sin(angle + c[0]))
+            if (rate := self._rate(angle)) in self.rates:
+                self.periods[self.rates.index(rate)] = period
+            return value
         return c[5] + c[3] * sp.sin(c[0] + d * (c[1] + d * c[2]))
 
     def lower(self) -> Program:
@@ -106,6 +117,7 @@ class Lowering(LoweringState):
             held.by_component(held.pins),
             held.by_component(held.projected),
             self.rates,
+            self.periods,
             clusters,
             self.stop_couplings,
             [self._jump(c) for c in surfaces],

@@ -38,6 +38,7 @@ class LoweringState:
         self._read: dict[Any, set[Any]] = {}  # free symbols of definitions
         self._gradients: dict[Any, dict[int, Any]] = {}
         self.rates: list[Any] = []
+        self.periods: dict[int, Any] = {}  # of waves, by the index of their rate
         self.unknown: dict[int, Any] = {}  # unknown of each surface
         self.definitions: dict[Any, Any] = {}
         self.effects: list[Any] = []  # effect of each unknown on the rate of its own surface

@@ -179,8 +179,8 @@ class CompiledLoop:
         times = call.times
         (times[0], times[1]), (times[2], times[3]) = known.first if known else target, origin
         call.longest[0] = kernels.longest
-        if arrays.rates is not self.system.rates:
-            arrays.rates = call.rates[:] = self.system.rates
+        if arrays.rates is not self.system.exact_rates:
+            arrays.rates = call.rates[:] = self.system.exact_rates
         model = arrays.model
         if model.tapes is not tapes or model.lin is not lin:
             model = replaced(model, tapes=tapes, lin=lin)

@@ -75,7 +75,7 @@ class LoopCall(NamedTuple):
     int_slots: np.ndarray  # (7,) integers at ORIGIN_AT, ...
     longest: np.ndarray  # (1,) longest segment
     times: np.ndarray  # (4,) target, and clock: the origin of the segment, which is advanced
-    rates: np.ndarray  # (R,) rates of the angles
+    rates: np.ndarray  # (R, 2) rates of the angles: numbers and rests
     scale: np.ndarray  # (n,) largest states on the segment
     # (5,), see `is_crowded`, and at SINCE the time from the last event to the last known time after it
     pace: np.ndarray

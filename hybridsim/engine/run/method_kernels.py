@@ -168,7 +168,7 @@ class CallArrays:
                 int_slots=np.zeros(7, dtype=np.int64),
                 longest=np.zeros(1),
                 times=np.zeros(4),
-                rates=np.zeros(layout.phases),
+                rates=np.zeros((layout.phases, 2)),
                 scale=np.empty(system.n),
                 pace=np.empty(5),
                 known=known_time_arrays(system),

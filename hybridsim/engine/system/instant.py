@@ -89,6 +89,12 @@ def multiple(start: float, k: int, period: float) -> Instant:
     return Instant(*two_sum(total, rest + error))
 
 
+def rest_of_rate(rate: float, period: float) -> float:
+    """Return 2 pi/period - rate for a rate that is this quotient within rounding errors."""
+    product, error = two_product(rate, period)
+    return ((_TWO_PI[0] - product) - error + _TWO_PI[1]) / period
+
+
 def phase(instant: Instant, rate: float, offset: float) -> float:
     """Return the phase (rate*instant + offset) modulo 2 pi, accurate for any number of turns."""
     return float(phase_of(instant.high, instant.low, rate, offset))

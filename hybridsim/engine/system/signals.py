@@ -9,6 +9,7 @@ from fractions import Fraction
 
 import numpy as np
 
+from hybridsim.engine.series.layout import SIGNAL_SLOTS
 from hybridsim.engine.system.instant import Instant, later, multiple, multiples
 from hybridsim.errors import ModelError
 from hybridsim.expr import evaluate
@@ -47,11 +48,9 @@ class Signal:
             return (self._step_value(origin, forward), 0.0, 0.0, 0.0, 0.0, 0.0)
         if self.kind == "chirp":
             return self._chirp_piece(origin, forward)
-        if self.shape == "sine":
-            number = self._number
-            turns = (_exact(origin) - Fraction(number["phase"])) / Fraction(number["period"])
-            angle = _TWO_PI * float(turns - round(turns))
-            return (angle, _TWO_PI / number["period"], 0.0, number["amplitude"], 0.0, number["offset"])
+        if self.shape == "sine":  # the lowered expressions contain all but the angle at t = 0
+            turns = Fraction(self._number["phase"]) / Fraction(self._number["period"])
+            return (_TWO_PI * float(round(turns) - turns), *(0.0,) * (SIGNAL_SLOTS - 1))
         return self._wave_piece(origin, forward)
 
     def next_knot(self, after: Instant, forward: bool) -> Instant | None:
@@ -76,8 +75,8 @@ class Signal:
 
     @property
     def is_polynomial(self) -> bool:
-        """Return whether each piece is a polynomial of time."""
-        return not (self.kind == "chirp" or self.shape == "sine")
+        """Return whether each piece is a polynomial of time; a sine is constant here, since it is lowered as text."""
+        return self.kind != "chirp"
 
     def ahead(self, after: Instant, most: int) -> tuple[np.ndarray, np.ndarray]:
         """Return at most `most` next knots (m, 2) of an input, and its coefficients (m + 1, 6) between the knots.
@@ -86,6 +85,8 @@ class Signal:
         """
         if self.kind == "table":
             return self._table_ahead(after, most)
+        if self.shape == "sine":
+            return np.zeros((0, 2)), np.array([(*self.piece(after, True)[:4], math.nan, math.nan)])
         knots, rows = self._repeated(after, most)
         first = int(np.count_nonzero((knots[:, 0] - after.high) + (knots[:, 1] - after.low) <= 0.0))
         if self.kind == "step":

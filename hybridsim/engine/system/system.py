@@ -18,7 +18,7 @@ from hybridsim.engine.series.optimise import OptimisedTape, has_corners, optimis
 from hybridsim.engine.series.registers import Registers
 from hybridsim.engine.series.short_series import Series
 from hybridsim.engine.system.finite_differences import run_differences, run_jacobian
-from hybridsim.engine.system.instant import Instant, phase_of
+from hybridsim.engine.system.instant import Instant, phase_of, rest_of_rate
 from hybridsim.engine.system.modules import compiled
 from hybridsim.engine.system.per_structure import per_structure
 from hybridsim.engine.system.signals import Signal
@@ -201,10 +201,10 @@ class System(_Frame):
         vars(self).update(vars(_frame_of(self)))
         self.values = model.parameter_values()
         self._base = np.array([*self.values.values(), *self.beyond_parameters])
-        self.rates = self.rates_at(self._base)
-        rates = self.rates.tolist()
-        self.fastest = max(map(abs, rates), default=0.0)
-        self._turning = tuple(enumerate(rates, self.layout.phases_at))
+        self.exact_rates = self.rates_at(self._base)
+        self.rates = self.exact_rates[:, 0]
+        self.fastest = max(map(abs, self.rates.tolist()), default=0.0)
+        self._turning = tuple(enumerate(self.exact_rates.tolist(), self.layout.phases_at))
         self._start, discrete = model.start_values(), model.discrete_values() if model.discrete else {}
         self.discrete_start = np.array([*discrete.values()])  # in the order of the state vector
         self.signals: tuple[Signal, ...] = ()
@@ -260,8 +260,8 @@ class System(_Frame):
         at = self.layout
         p[at.discrete_slice] = discrete
         p[at.origin_at] = origin.high + origin.low
-        for place, rate in self._turning:
-            p[place] = phase_of(origin.high, origin.low, rate, 0.0)
+        for place, (rate, rest) in self._turning:
+            p[place] = phase_of(origin.high, origin.low, rate, rest * origin.high)
         for k, signal in enumerate(self.signals):
             place = at.signals_at + SIGNAL_SLOTS * k
             p[place : place + SIGNAL_SLOTS] = signal.piece(origin, forward)
@@ -288,10 +288,19 @@ class System(_Frame):
         return self.code.address(name)
 
     def rates_at(self, p: np.ndarray) -> np.ndarray:
-        """Return the rates at which angles grow in time, at the parameter values in `p`."""
-        out = np.zeros(self.layout.phases)
-        self.code.module.rates(0.0, np.zeros(0), p, np.zeros(0, dtype=np.int64), out)
-        return out
+        """Return the rates (R, 2) at which angles grow in time, at the parameter values in `p`.
+
+        A rate is the sum of a number and a rest. The rest is not zero for a wave, whose period is exact.
+        """
+        module, none = self.code.module, (np.zeros(0), p, np.zeros(0, dtype=np.int64))
+        waves, found = self.code.data["of_waves"], np.zeros((self.layout.phases, 2))
+        module.rates(0.0, *none, found[:, 0])
+        if waves:
+            periods = np.zeros(len(waves))
+            module.periods(0.0, *none, periods)
+            for k, period in zip(waves, periods.tolist(), strict=True):
+                found[k, 1] = rest_of_rate(found[k, 0], period)
+        return found
 
     def flow(self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> np.ndarray:
         """Return the rates dx/dt (n,) of the states."""

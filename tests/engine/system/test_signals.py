@@ -15,7 +15,8 @@ from hypothesis import strategies as st
 
 from hybridsim.engine.system.instant import Instant, multiple
 from hybridsim.engine.system.signals import Signal
-from hybridsim.model import Input
+from hybridsim.engine.system.system import System
+from hybridsim.model import Input, Model, State
 
 EPS = 2.0**-52
 periods = st.floats(1e-3, 1e3)
@@ -150,16 +151,21 @@ def test_knots_of_a_wave_follow_each_other_for_ever() -> None:
 def test_a_sine_is_right_to_rounding_over_a_billion_periods(
     period: float, k: int, at: float, delay: float, local: float
 ) -> None:
-    signal = Signal(
-        Input("u", "wave", shape="sine", period=period, phase=delay, amplitude=2.0, offset=1.0), {}
+    model = Model(
+        "m",
+        states=(State("x", 0.0, "u"),),
+        inputs=(Input("u", "wave", shape="sine", period="T", phase=delay, amplitude=2.0, offset=1.0),),
+        parameters={"T": period},
     )
+    system = System(model)
     origin, s = multiple(delay, k, period).plus(at * period), local * period
     with mpmath.workdps(60):
         t = mpmath.mpf(origin.high) + mpmath.mpf(origin.low) + mpmath.mpf(s)
         true = 1 + 2 * mpmath.sin(2 * mpmath.pi * (t - mpmath.mpf(delay)) / mpmath.mpf(period))
+        p = system.vector(origin, np.zeros(0))
         # an angle of up to four turns, each of its terms rounded
-        assert abs(angle_value(signal.piece(origin, True), s) - true) <= 2 * 60 * EPS
-    assert signal.next_knot(origin, True) is None
+        assert abs(system.flow(s, np.zeros(1), p, np.zeros(0, dtype=np.int64))[0] - true) <= 2 * 60 * EPS
+    assert system.signals[0].next_knot(origin, True) is None
 
 
 @given(

@@ -43,10 +43,7 @@ class SignalSlopes:
         """Return the derivatives (6, Q) of the coefficients that describe an input just after an instant."""
         found, kind, d, v = np.zeros((len(slots), self.width)), self.declared.kind, self._slope, self._value
         if kind == "wave" and self.declared.shape == "sine":
-            period = v["period"]
-            found[0] = -_TWO_PI * (d["phase"] + (origin - v["phase"]) / period * d["period"]) / period
-            found[1] = -_TWO_PI / period**2 * d["period"]
-            found[3], found[5] = d["amplitude"], d["offset"]
+            found[0] = -_TWO_PI * (d["phase"] - v["phase"] / v["period"] * d["period"]) / v["period"]
         elif kind == "wave":
             _, value, slope = self._corner(origin + slots[4])
             found[0] = d["offset"] + value * d["amplitude"]

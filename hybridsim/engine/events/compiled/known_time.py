@@ -94,7 +94,7 @@ def set_origin(place: Any, rates: Any, hi: float, lo: float, p: Any) -> None:
     origin_at, phases_at = place
     p[origin_at] = hi + lo
     for i in range(rates.shape[0]):
-        p[phases_at + i] = phase_of(hi, lo, rates[i], 0.0)
+        p[phases_at + i] = phase_of(hi, lo, rates[i, 0], rates[i, 1] * hi)
 
 
 @inlined

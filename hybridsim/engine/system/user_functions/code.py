@@ -252,6 +252,7 @@ def _data(model: Model, resets: list[tuple[tuple[Any, ...], dict[str, Any]]]) ->
         "clusters": (),
         "stop_couplings": (),
         "rates": 0,
+        "of_waves": (),
         "linear": {"": (False,)} | linear,
         "quantities": tuple(output.name for output in model.outputs),
         "resets": tuple((key, tuple(reset)) for key, reset in resets),
