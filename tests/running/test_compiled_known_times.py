@@ -128,6 +128,52 @@ def test_a_sampled_controller(method, no_general_segments) -> None:
     assert sol.output("s", [10.0])[0] == pytest.approx(s, rel=1e-10)
 
 
+@pytest.mark.parametrize("method", METHODS)
+def test_a_clock_that_adds(method, no_general_segments, monkeypatch) -> None:
+    """x' = -x + u; each tick adds -0.4 x to u, and x to s, from the values before. No tick leaves the compiled loop."""
+
+    def refuse(*_, **__):
+        raise AssertionError("the general loop took a tick")
+
+    monkeypatch.setattr(mode_loop.ModeLoop, "_resolve_appointment", refuse)
+    model = hs.Model(
+        "adding",
+        states=[hs.State("x", 1, "-x + u")],
+        discrete={"u": 0.25, "s": 0.0},
+        schedules=[hs.Schedule("tick", start=0.25, period=0.25, reset={"u": "+= -0.4*x", "s": "+= x"})],
+    )
+    sol = hs.simulate(model, (0, 50.1), integrator=method, rtol=1e-12)
+    x, u, s, decay = 1.0, 0.25, 0.0, math.exp(-0.25)
+    for _ in range(200):
+        x = decay * x + (1.0 - decay) * u
+        u, s = u - 0.4 * x, s + x
+    assert len(sol.events) == 200
+    assert sol.output("s", [50.0])[0] == pytest.approx(s, rel=1e-9, abs=1e-9)
+    assert sol.output("u", [50.0])[0] == pytest.approx(u, rel=1e-9, abs=1e-9)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_two_clocks_that_add_to_one_value_at_one_instant(method) -> None:
+    """Both amounts count, with the values before; so do those of a clock that is declared twice."""
+    for second in ("+= 0.5*n", "+= 1"):
+        model = hs.Model(
+            "two",
+            states=[hs.State("x", 0, "n")],
+            discrete={"n": 1.0},
+            schedules=[
+                hs.Schedule("a", start=0.5, period=0.5, reset={"n": "+= 1"}),
+                hs.Schedule("b", start=1.0, period=1.0, reset={"n": second}),
+            ],
+        )
+        sol = hs.simulate(model, (0, 4.25), integrator=method, rtol=1e-12)
+        n, x = 1.0, 0.0
+        for k in range(1, 9):
+            x += 0.5 * n
+            n += 1.0 + ((0.5 * n if "n" in second else 1.0) if k % 2 == 0 else 0.0)
+        assert sol.output("n", [4.1])[0] == n
+        assert sol.y[0, -1] == pytest.approx(x + 0.25 * n, rel=1e-12)
+
+
 def friction(**parts):
     return hs.Model(
         "block",

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from hybridsim.engine.lowering.reset_keys import added
 from hybridsim.engine.series.optimise import PAIRED, arguments_of
 from hybridsim.engine.system.instant import Instant
 from hybridsim.engine.system.per_structure import per_structure
@@ -118,9 +117,9 @@ class TimesAhead:
         self._passed = 0  # number of times in the block up to the present instant
 
     def _is_simple(self, k: int) -> bool:
-        """Return whether a schedule sets discrete states only, or changes nothing."""
+        """Return whether a schedule changes discrete states only, or nothing; amounts to add are sums in its reset."""
         system, key = self.system, ("schedule", k)
-        if system.model.schedules[k].terminate or added(key) in system.resets:
+        if system.model.schedules[k].terminate:
             return False
         return not set(system.resets.get(key, (0, ()))[1]) & set(system.names)
 
