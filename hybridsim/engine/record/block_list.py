@@ -199,8 +199,9 @@ class SegmentBlockList(BlockList[Segment]):
         starts = self.starts()
         owner = np.searchsorted(starts, index, side="right") - 1
         out = np.empty((len(s), self._shape[0]))
-        for b in np.unique(owner):
-            chosen = np.flatnonzero(owner == b)
+        order = np.argsort(owner, kind="stable")
+        found, first = np.unique(owner[order], return_index=True)
+        for b, chosen in zip(found.tolist(), np.split(order, first)[1:], strict=True):
             out[chosen] = self.blocks[b].states(index[chosen] - starts[b], s[chosen])
         return out
 
