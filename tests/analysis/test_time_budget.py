@@ -48,4 +48,5 @@ def test_compiling_that_takes_a_while_is_said_once(
         doubled.__module__ = module
         numba.njit(doubled)(1.0)  # not cached: it is compiled each time
     (line,) = capsys.readouterr().err.splitlines()
-    assert line.startswith("hybridsim: compiling another part of the engine (once, 10 to 30 s); cached in /")
+    before, _, after = line.partition(" (once, 10 to 30 s); cached in /")
+    assert before.startswith("hybridsim: compiling another part of the engine, hybridsim/") and after

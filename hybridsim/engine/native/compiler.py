@@ -69,7 +69,7 @@ if ENABLED:
                 if compiled.startswith("hybridsim."):
                     _set(_ours())
                     if so_far > _NOTICED:
-                        announce_part()
+                        announce_part(compiled)
                 return
             if of.depth == 0:
                 of.since = time.perf_counter()

@@ -20,9 +20,10 @@ def announce_engine() -> None:
         _tell("compiling the engine (once, about 30 s per integrator)")
 
 
-def announce_part() -> None:
-    """Print that an additional part of the engine, such as derivatives, is being compiled."""
-    _tell("compiling another part of the engine (once, 10 to 30 s)")
+def announce_part(module: str) -> None:
+    """Print that an additional part of the engine is being compiled, with the folder of its module."""
+    folder = "/".join(module.split(".")[:-1])
+    _tell(f"compiling another part of the engine, {folder} (once, 10 to 30 s)")
 
 
 def _tell(what: str) -> None:
