@@ -181,9 +181,18 @@ def _evaluate(
 
 
 def on_first_use(make: Callable[[], Dense]) -> Dense:
-    """Return dense output that is made when it is first evaluated."""
-    made = cache(make)
-    return lambda s: made()(s)
+    """Return dense output that is made when it is first evaluated.
+
+    `functools.cache` would copy the attributes of `make` at every step, which takes a few per cent of a step.
+    """
+    made: list[Dense] = []
+
+    def dense(s: np.ndarray) -> np.ndarray:
+        if not made:
+            made.append(make())
+        return made[0](s)
+
+    return dense
 
 
 def hermite(s0: float, s1: float, left: np.ndarray, right: np.ndarray) -> Dense:
