@@ -85,7 +85,7 @@ def test_inputs_are_looked_up_at_any_time() -> None:
 @pytest.mark.parametrize(
     ("z", "words"),
     [
-        ({}, "`z` needs a mode of f"),
+        ({}, "component f has no initial mode, so `z` must contain its mode"),
         ({"g": "stick"}, "not a component"),
         ({"f": "sticks"}, "stick"),
     ],

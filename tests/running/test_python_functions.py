@@ -66,9 +66,9 @@ def misspelt(t: float, x: Any, p: Any) -> Any:
 @pytest.mark.parametrize(
     ("model", "message"),
     [
-        (ball(flow=three), "the flow three returned tuple of shape .3,., and the model has 2 states"),
-        (ball(flow=words), "the flow words returned .'fast', 'slow'."),
-        (ball(flow=height), "the flow height returned 1.0, and the model has 2 states"),
+        (ball(flow=three), "the flow three must return 2 numbers, but returned tuple of shape .3,."),
+        (ball(flow=words), "the flow words must return 2 numbers, but returned .'fast', 'slow'."),
+        (ball(flow=height), "the flow height must return 2 numbers, but returned 1.0"),
         (oscillator(monitors=[hs.Monitor("m", row)]), "the function row returned ndarray of shape .2,."),
         (ball(flow=misspelt), "misspelt raised AttributeError: .*gravity"),
     ],

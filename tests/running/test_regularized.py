@@ -125,6 +125,6 @@ def test_karnopp_refuses_contacts_that_act_on_each_other() -> None:
             hs.Contact("f2", velocity="v2 - v1", normal=1, law="coulomb", arguments={"mu": 0.3}),
         ],
     )
-    with pytest.raises(hs.UsageError, match="acts on its velocity"):
+    with pytest.raises(hs.UsageError, match="also acts on the velocity of this contact"):
         model.regularized("karnopp", v0=1e-3)
     hs.simulate(model.regularized("tanh", v0=1e-2), (0, 0.1))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybridsim.engine.system.system import CORNER
+from hybridsim.engine.system.automaton import CORNER
 from hybridsim.solution import Solution
 
 _NEAR = 1e-6  # of a period: an event this close to its end may move onto it while the motion settles

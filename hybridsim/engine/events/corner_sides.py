@@ -19,7 +19,7 @@ from hybridsim.engine.events.input_jumps import gaps_jump
 from hybridsim.engine.events.outcome import Change
 
 if TYPE_CHECKING:
-    from hybridsim.engine.system.system import Automaton
+    from hybridsim.engine.system.automaton import Automaton
 
 _ROUNDS_PER_MODE = 4  # orders of a series: each order settles at least one more component
 

@@ -9,8 +9,9 @@ import numpy as np
 from hybridsim.engine.events.choice.verdict import NO_SIDE
 from hybridsim.engine.events.outcome import Change, Situation
 from hybridsim.engine.series.short_series import Series
+from hybridsim.engine.system.automaton import RESET
 from hybridsim.engine.system.programs.mode_tables import automata_of
-from hybridsim.engine.system.system import RESET, System
+from hybridsim.engine.system.system import System
 
 
 class EventData:

@@ -17,7 +17,7 @@ from hybridsim.engine.lowering.program_names import declared_name, user
 from hybridsim.engine.lowering.second_order import attraction, partners
 from hybridsim.engine.lowering.shared_rates import refuse_changed_rates, shared_rates
 from hybridsim.engine.lowering.stop_coupling import StopCoupling, coupling_help, stop_couplings, without_share
-from hybridsim.engine.series.layout import SIGNAL_SLOTS, Layout
+from hybridsim.engine.series.layout import Layout
 from hybridsim.errors import ModelError
 from hybridsim.expr.simplify import is_short, simplified, written_out
 from hybridsim.expr.symbolic import without_distributions
@@ -52,30 +52,6 @@ class Program:
 
 class Lowering(LoweringState):
     """The steps that convert a `Model` to a `Program`."""
-
-    def signal(self, index: int) -> Any:
-        """Return an input as an expression in local time, which is valid until its next knot."""
-        sp = self.sp
-        declared = self.model.inputs[index]
-        if (kind := declared.kind) == "connected":
-            raise declared.not_connected(self.model.name)
-        c = [sp.Symbol(f"signal_{index}_{j}", real=True) for j in range(SIGNAL_SLOTS)]
-        d = self.s - c[4]
-        if kind == "step":
-            return c[0]
-        if kind == "table" or (kind == "wave" and self.model.inputs[index].shape != "sine"):
-            return c[0] + d * (c[1] + d * (c[2] + d * c[3]))
-        if kind == "wave":
-            expressions = declared.expressions
-            offset, amplitude, period = (
-                self.convert(expressions[n]) for n in ("offset", "amplitude", "period")
-            )
-            angle = 2 * sp.pi * self.t / period
-            value = self._local_angles(offset + amplitude * sp.sin(angle + c[0]))
-            if (rate := self._rate(angle)) in self.rates:
-                self.periods[self.rates.index(rate)] = period
-            return value
-        return c[5] + c[3] * sp.sin(c[0] + d * (c[1] + d * c[2]))
 
     def lower(self) -> Program:
         """Convert the model to a program by all steps of the lowering."""

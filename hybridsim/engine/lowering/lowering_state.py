@@ -9,6 +9,7 @@ import sympy as sp
 
 from hybridsim.engine.lowering.program import Assign, Switch
 from hybridsim.engine.lowering.program_names import shown, user
+from hybridsim.engine.series.layout import SIGNAL_SLOTS
 from hybridsim.errors import Place
 from hybridsim.expr.parse import Expression
 from hybridsim.expr.symbolic import to_sympy
@@ -101,6 +102,30 @@ class LoweringState:
         for kind in (sp.sin, sp.cos, sp.tan):
             e = e.replace(kind, lambda a, k=kind: rewrite(a, k))
         return e
+
+    def signal(self, index: int) -> Any:
+        """Return an input as an expression in local time, which is valid until its next knot."""
+        sp = self.sp
+        declared = self.model.inputs[index]
+        if (kind := declared.kind) == "connected":
+            raise declared.not_connected(self.model.name)
+        c = [sp.Symbol(f"signal_{index}_{j}", real=True) for j in range(SIGNAL_SLOTS)]
+        d = self.s - c[4]
+        if kind == "step":
+            return c[0]
+        if kind == "table" or (kind == "wave" and self.model.inputs[index].shape != "sine"):
+            return c[0] + d * (c[1] + d * (c[2] + d * c[3]))
+        if kind == "wave":
+            expressions = declared.expressions
+            offset, amplitude, period = (
+                self.convert(expressions[n]) for n in ("offset", "amplitude", "period")
+            )
+            angle = 2 * sp.pi * self.t / period
+            value = self._local_angles(offset + amplitude * sp.sin(angle + c[0]))
+            if (rate := self._rate(angle)) in self.rates:
+                self.periods[self.rates.index(rate)] = period
+            return value
+        return c[5] + c[3] * sp.sin(c[0] + d * (c[1] + d * c[2]))
 
     def inlined(self, expression: Expression) -> Any:
         """Return a declared expression in SymPy with all definitions substituted."""

@@ -12,8 +12,9 @@ import numpy as np
 
 from hybridsim.engine.native.kernels import Precompiled, kernel
 from hybridsim.engine.record.segments import Occurrence
+from hybridsim.engine.system.automaton import RESET
 from hybridsim.engine.system.instant import Instant
-from hybridsim.engine.system.system import RESET, System
+from hybridsim.engine.system.system import System
 
 AT_KNOWN_TIME = -2  # kind k of a known time is AT_KNOWN_TIME - k in place of a guard
 

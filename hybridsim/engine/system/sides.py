@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from hybridsim.engine.system.system import Automaton, System
+    from hybridsim.engine.system.automaton import Automaton
+    from hybridsim.engine.system.system import System
 
 
 def modes_by_state(

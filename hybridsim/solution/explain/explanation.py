@@ -12,7 +12,7 @@ import numpy as np
 from hybridsim.engine.events.choice.verdict import side_after
 from hybridsim.engine.events.zeno.accumulation import SAME_FACTOR, turn_of
 from hybridsim.engine.events.zeno.limits import LIMIT
-from hybridsim.engine.system.system import CORNER
+from hybridsim.engine.system.automaton import CORNER
 from hybridsim.errors import UsageError
 from hybridsim.expr import assignment
 from hybridsim.model.checks.units import label_of, units_of

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridsim.engine.series.bounded import UNIT
-from hybridsim.engine.system.system import CORNER
+from hybridsim.engine.system.automaton import CORNER
 from hybridsim.model.smoothing.jumps import SIGN
 from hybridsim.model.smoothing.one_sided import names_of, number_of
 from hybridsim.solution.explain.candidate import as_in

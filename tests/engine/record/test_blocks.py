@@ -16,8 +16,8 @@ from hybridsim.engine.record.blocks import OccurrenceList, SegmentList
 from hybridsim.engine.record.event_block import EventBlock
 from hybridsim.engine.record.segments import Occurrence
 from hybridsim.engine.record.series_block import SeriesBlock
+from hybridsim.engine.system.automaton import Automaton
 from hybridsim.engine.system.instant import Instant
-from hybridsim.engine.system.system import Automaton
 
 
 def occurrence(t: float, component: str = "c", kind: str = "transition") -> Occurrence:

@@ -14,8 +14,8 @@ import numpy as np
 
 from hybridsim.engine.native.kernels import inlined, kernel
 from hybridsim.engine.record.checkpoint import BEGINNING, Pace
+from hybridsim.engine.system.automaton import Automaton
 from hybridsim.engine.system.instant import Instant
-from hybridsim.engine.system.system import Automaton
 
 # Number of consecutive intervals that must shrink by one factor before they count as a series, unlike a transient.
 _TERMS = 10

@@ -22,8 +22,9 @@ from hybridsim.engine.record.segments import Occurrence
 from hybridsim.engine.record.trajectory import LOOKED_BACK_ON, Trajectory
 from hybridsim.engine.series.bounded import UNIT
 from hybridsim.engine.series.short_series import Series
+from hybridsim.engine.system.automaton import Automaton
 from hybridsim.engine.system.instant import Instant
-from hybridsim.engine.system.system import Automaton, System
+from hybridsim.engine.system.system import System
 
 _STRIDE = 1.5  # ratio of the speeds of the examined bounces
 LEAST_LOSS = 1e-4  # least relative loss of speed in a bounce; less means over 10**4 bounces per digit
