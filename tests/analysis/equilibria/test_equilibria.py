@@ -108,7 +108,7 @@ def test_onset_by_the_sign_of_the_growth_and_by_simulation() -> None:
 
 
 def test_bad_questions_are_refused() -> None:
-    with pytest.raises(UsageError, match="forced"):
+    with pytest.raises(UsageError, match="has forcing"):
         hs.equilibria("dfcs")
     with pytest.raises(UsageError, match="'slide'"):
         hs.linearize("belt", "slide")

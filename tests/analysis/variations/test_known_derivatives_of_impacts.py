@@ -149,7 +149,7 @@ def test_two_bodies_that_reach_their_floors_together_are_refused() -> None:
         impacts=[hs.Impact("p", gap="h", restitution=0.5), hs.Impact("q", gap="y", restitution=0.5)],
     )
     solution = hs.simulate(model, (0, 0.4), integrator="exact")
-    with pytest.raises(UsageError, match="several events at t = 0"):
+    with pytest.raises(UsageError, match="several events coincide at t = 0"):
         hs.sensitivities(solution)
 
 

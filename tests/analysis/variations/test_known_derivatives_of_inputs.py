@@ -165,5 +165,5 @@ def test_knots_of_two_inputs_at_one_instant_that_move_apart_are_refused() -> Non
             hs.Input("w", "wave", shape="square", period=4, phase=0.5),
         ],
     )
-    with pytest.raises(UsageError, match="several events at t = 0"):
+    with pytest.raises(UsageError, match="several events coincide at t = 0"):
         hs.sensitivities(hs.simulate(model, (0, 1)))
