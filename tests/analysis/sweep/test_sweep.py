@@ -292,7 +292,7 @@ def test_an_expression_that_is_none() -> None:
 
 def test_what_is_no_measurement_is_a_status() -> None:
     found = hs.sweep("dfcs", {"F0": [1.0]}, lambda model: {"a": object()})
-    assert "the measure returned object as a" in found.status[0] and found.values == {}
+    assert "the measure returned a value of type object for a" in found.status[0] and found.values == {}
     with pytest.raises(hs.UsageError, match="no 'a'"):
         found["a"]
 

@@ -287,7 +287,7 @@ def test_what_cannot_be_told_from_another_one_is_refused(tmp_path: Path) -> None
         with lock:
             return model.parameter_values()["F0"]
 
-    with pytest.raises(hs.UsageError, match=r"an object of lock(?s:.)*__getstate__"):
+    with pytest.raises(hs.UsageError, match=r"an object of type lock(?s:.)*__getstate__"):
         hs.sweep("dfcs", {"F0": [20.0, 30.0]}, measure, journal=path)
     assert not path.exists()
     assert hs.sweep("dfcs", {"F0": [20.0, 30.0]}, measure)["value"].tolist() == [20.0, 30.0]
