@@ -245,7 +245,7 @@ a log file.
 | points whose computation was begun more than once, over all kills | {lost} |
 | points begun again after one kill, at most | {most} |
 
-The journal is written after each group of points. A kill therefore costs the points of the current group. The sweep
+The journal is written after each group of points. A kill therefore loses the results of the current group. The sweep
 has one worker.
 """
 
