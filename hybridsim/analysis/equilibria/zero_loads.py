@@ -82,8 +82,10 @@ def _other_times(system: System, t: float) -> list[float]:
 
 def _value(signal: Signal, t: float) -> float:
     """Return the value of an input just after time t."""
+    if signal.shape == "sine":
+        return signal.sine(t)
     c0, c1, c2, c3, start, offset = signal.piece(Instant(t), True)
     d = -start
-    if signal.kind == "chirp" or signal.shape == "sine":
+    if signal.kind == "chirp":
         return offset + c3 * math.sin(c0 + d * (c1 + d * c2))
     return c0 + d * (c1 + d * (c2 + d * c3))

@@ -53,6 +53,12 @@ class Signal:
             return (_TWO_PI * float(round(turns) - turns), *(0.0,) * (SIGNAL_SLOTS - 1))
         return self._wave_piece(origin, forward)
 
+    def sine(self, t: float) -> float:
+        """Return the value of a sine wave at time t: offset + amplitude sin(2 pi (t - phase)/period)."""
+        number = self._number
+        turns = (Fraction(t) - Fraction(number["phase"])) / Fraction(number["period"])
+        return number["offset"] + number["amplitude"] * math.sin(_TWO_PI * float(turns - round(turns)))
+
     def next_knot(self, after: Instant, forward: bool) -> Instant | None:
         """Return the next knot in the direction of time, or None if no knot follows an instant."""
         if self.kind == "table":

@@ -48,6 +48,8 @@ def test_a_load_that_is_still_zero_is_named(normal: str) -> None:
     ("normal", "t", "largest"),
     [
         ("N0*abs(sin(pi*t))", 1.0, 4.0),  # the sine of pi is 1.2e-16, not 0
+        ("N0*abs(wave)", 2.0, 4.0),
+        ("N0*abs(wave)", 2.0004, 4.0),
         ("N0*(1.0001 - cos(pi*t/2))", 0.0, 8.0004),
         ("N0*(table + 1e-4)", 0.0, 4.0004),
     ],
@@ -66,6 +68,11 @@ def test_a_load_that_is_zero_only_by_rounding_is_named(normal: str) -> None:
     (warning,) = hs.linearize(model, "slip-", t=0.1 + 0.2).warnings
     assert "e-16 at t = 0.3, zero within rounding, at which" in warning
     assert hs.linearize(model, "slip-", t=0.3 + 1e-9).warnings == ()
+
+
+def test_a_load_on_a_sine_wave_that_is_large_is_not_named() -> None:
+    """At a quarter of its period the wave is at its largest value, 1."""
+    assert hs.linearize(pad("N0*abs(wave)"), "slip-", t=1.0).warnings == ()
 
 
 def test_a_hundredth_of_the_largest_load_is_not_small() -> None:
