@@ -254,7 +254,7 @@ def test_the_known_times_are_those_of_the_timetable(seed) -> None:
             timetable.mark_done(at)
             for piece, signal in zip(known.polynomials[i + 1], system.signals, strict=True):
                 start = 0.0 if math.isnan(piece[4]) else Instant(*piece[4:].tolist()).minus(at)
-                assert (*piece[:4].tolist(), start, 0.0) == signal.piece(at, True)
+                assert (*piece[:4].tolist(), start) == signal.piece(at, True)
         appointment = timetable.next(at, True)
         assert known.appointment == appointment
         if appointment is None:

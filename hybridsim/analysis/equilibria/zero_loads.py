@@ -84,8 +84,8 @@ def _value(signal: Signal, t: float) -> float:
     """Return the value of an input just after time t."""
     if signal.shape == "sine":
         return signal.sine(t)
-    c0, c1, c2, c3, start, offset = signal.piece(Instant(t), True)
+    c0, c1, c2, c3, start = signal.piece(Instant(t), True)
     d = -start
     if signal.kind == "chirp":
-        return offset + c3 * math.sin(c0 + d * (c1 + d * c2))
+        return c3 * math.sin(c0 + d * (c1 + d * c2))
     return c0 + d * (c1 + d * (c2 + d * c3))

@@ -125,7 +125,7 @@ class LoweringState:
             if (rate := self._rate(angle)) in self.rates:
                 self.periods[self.rates.index(rate)] = period
             return value
-        return c[5] + c[3] * sp.sin(c[0] + d * (c[1] + d * c[2]))
+        return c[3] * sp.sin(c[0] + d * (c[1] + d * c[2]))
 
     def inlined(self, expression: Expression) -> Any:
         """Return a declared expression in SymPy with all definitions substituted."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-SIGNAL_SLOTS = 6  # with d = t - c4: c0 + d (c1 + d (c2 + d c3)), or c5 + c3 sin(c0 + d (c1 + d c2))
+SIGNAL_SLOTS = 5  # with d = t - c4: c0 + d (c1 + d (c2 + d c3)), or c3 sin(c0 + d (c1 + d c2)) for a chirp
 
 
 @dataclass(frozen=True)

@@ -41,11 +41,11 @@ class Signal:
             self.corners = square if self.shape == "square" else _SHAPES[str(self.shape)]
 
     def piece(self, origin: Instant, forward: bool) -> tuple[float, ...]:
-        """Return the six numbers that describe an input just after an instant, or just before it in a backward run."""
+        """Return the five numbers that describe an input just after an instant, or just before it in a backward run."""
         if self.kind == "table":
             return self._table_piece(origin, forward)
         if self.kind == "step":
-            return (self._step_value(origin, forward), 0.0, 0.0, 0.0, 0.0, 0.0)
+            return (self._step_value(origin, forward), 0.0, 0.0, 0.0, 0.0)
         if self.kind == "chirp":
             return self._chirp_piece(origin, forward)
         if self.shape == "sine":  # the lowered expressions contain all but the angle at t = 0
@@ -181,13 +181,12 @@ class Signal:
             0.0,
             0.0,
             start.minus(origin),
-            0.0,
         )
 
     def _table_piece(self, origin: Instant, forward: bool) -> tuple[float, ...]:
         index = (bisect_right if forward else bisect_left)(self._knots, origin)
         start = self._knots[max(index - 1, 0)].minus(origin)
-        return (*self._coefficients[index], start, 0.0)
+        return (*self._coefficients[index], start)
 
     def _chirp_piece(self, origin: Instant, forward: bool) -> tuple[float, ...]:
         number = self._number
@@ -203,7 +202,7 @@ class Signal:
         else:
             turns, rate, bend_here = f0 * t + bend * t * t, f0 + 2 * bend * t, bend
         angle = number["phase"] + _TWO_PI * float(turns - round(turns))
-        return (angle, _TWO_PI * float(rate), _TWO_PI * float(bend_here), number["amplitude"], 0.0, 0.0)
+        return (angle, _TWO_PI * float(rate), _TWO_PI * float(bend_here), number["amplitude"], 0.0)
 
 
 def step_turns(

@@ -88,12 +88,12 @@ def signals(system: System, p: np.ndarray, s: float) -> dict[str, mpmath.mpf]:
     """Inputs at local time s, from the slots of their pieces (which have tests of their own)."""
     values = {}
     for k, declared in enumerate(system.model.inputs):
-        c = [mpmath.mpf(float(v)) for v in p[system.layout.signals_at + 6 * k :][:6]]
+        c = [mpmath.mpf(float(v)) for v in p[system.layout.signals_at + 5 * k :][:5]]
         d = mpmath.mpf(s) - c[4]
         line = c[0] + d * (c[1] + d * (c[2] + d * c[3]))
         angle = c[0] + d * (c[1] + d * c[2])
         straight = declared.kind == "table" or declared.shape not in (None, "sine")
-        values[declared.name] = line if straight else c[5] + c[3] * mpmath.sin(angle)
+        values[declared.name] = line if straight else c[3] * mpmath.sin(angle)
     return values
 
 

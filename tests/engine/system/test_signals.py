@@ -31,9 +31,9 @@ def value(slots: tuple[float, ...], s: float) -> float:
 
 
 def angle_value(slots: tuple[float, ...], s: float) -> float:
-    c0, c1, c2, c3, c4, c5 = slots
+    c0, c1, c2, c3, c4 = slots
     d = s - c4
-    return c5 + c3 * math.sin(c0 + d * (c1 + d * c2))
+    return c3 * math.sin(c0 + d * (c1 + d * c2))
 
 
 def exact(instant: Instant) -> Fraction:

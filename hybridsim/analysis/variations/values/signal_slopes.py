@@ -40,7 +40,7 @@ class SignalSlopes:
         self.is_fixed = not any(each.any() for each in self._slope.values())
 
     def coefficients(self, origin: float, slots: np.ndarray) -> np.ndarray:
-        """Return the derivatives (6, Q) of the coefficients that describe an input just after an instant."""
+        """Return the derivatives (5, Q) of the coefficients that describe an input just after an instant."""
         found, kind, d, v = np.zeros((len(slots), self.width)), self.declared.kind, self._slope, self._value
         if kind == "wave" and self.declared.shape == "sine":
             found[0] = -_TWO_PI * (d["phase"] - v["phase"] / v["period"] * d["period"]) / v["period"]

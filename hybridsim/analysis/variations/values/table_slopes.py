@@ -53,7 +53,7 @@ class TableSlopes:
         self.value, self._unit = declared.values[index], Signal(replace(declared, values=values), {})
 
     def coefficients(self, origin: float) -> np.ndarray:
-        """Return the derivatives (6,) of the coefficients that describe a table just after an instant."""
+        """Return the derivatives (5,) of the coefficients that describe a table just after an instant."""
         found = np.zeros(SIGNAL_SLOTS)
         found[:4] = self._unit.piece(Instant(origin), True)[:4]
         return found

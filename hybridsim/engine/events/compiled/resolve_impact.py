@@ -50,7 +50,7 @@ def _are_clear(tapes: Any, lin: Any, k: int, fired: int, work: Any) -> bool:
 
 @inlined
 def _may_take_part(automata: Any, c: int, z: Any) -> bool:
-    """Return whether a contact at its surface takes part in an impact on component `c`, or has to be chosen anew."""
+    """Return whether a second contact may take part in an impact on component `c`, or may change its mode."""
     cluster = cluster_of(automata, c)
     for i in range(cluster.shape[0]):
         d = cluster[i]
