@@ -25,7 +25,7 @@ turns = st.sampled_from([0, 1, 7, -3, 1000, 10**6, 10**9])
 
 def value(slots: tuple[float, ...], s: float) -> float:
     """A piece at local time s, as the generated code evaluates it."""
-    c0, c1, c2, c3, c4, _ = slots
+    c0, c1, c2, c3, c4 = slots
     d = s - c4
     return c0 + d * (c1 + d * (c2 + d * c3))
 
