@@ -108,7 +108,7 @@ def refuse_plain_time(system: System, period: float | None) -> None:
 
 
 def _with_time(model: Model) -> Iterator[tuple[str, ast.expr]]:
-    """Yield the declarations that contain t outside of sines and cosines, with their names for messages."""
+    """Yield the declarations that contain t outside of sines and cosines of linear time, with names for messages."""
     found = [(f"definition {name}", expr) for name, expr in model.definitions]
     for contact in model.contacts:
         found.append((f"contact {contact.name}, normal", contact.normal))
@@ -124,7 +124,27 @@ def _with_time(model: Model) -> Iterator[tuple[str, ast.expr]]:
 
 def _has_plain_time(node: ast.AST) -> bool:
     if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in _PERIODIC:
-        return False
+        return not _is_linear(node.args[0])
     if isinstance(node, ast.Name):
         return node.id == TIME
     return any(map(_has_plain_time, ast.iter_child_nodes(node)))
+
+
+def _is_linear(node: ast.expr) -> bool:
+    """Return whether an expression is linear in t as it is written: a sum of terms in which t is a factor once."""
+    match node:
+        case ast.BinOp(op=ast.Add() | ast.Sub(), left=left, right=right):
+            return _is_linear(left) and _is_linear(right)
+        case ast.BinOp(op=ast.Mult(), left=left, right=right):
+            return _is_linear(left) and _is_linear(right) and not (_has_time(left) and _has_time(right))
+        case ast.BinOp(op=ast.Div(), left=left, right=right):
+            return _is_linear(left) and not _has_time(right)
+        case ast.UnaryOp(operand=operand):
+            return _is_linear(operand)
+        case ast.Name():
+            return True
+    return not _has_time(node)
+
+
+def _has_time(node: ast.expr) -> bool:
+    return TIME in names_of(node)

@@ -115,6 +115,20 @@ def test_a_ramp_does_not_repeat_with_a_period_that_is_passed(ramp: str) -> None:
         hs.steady_state(defined, period=2.0 * math.pi)
 
 
+@pytest.mark.parametrize("force", ["sin(t**2)", "cos(0.3*t*t)", "sin(exp(t))"])
+def test_a_sine_of_a_time_that_is_not_linear_does_not_repeat(force: str) -> None:
+    chirp = hs.Model("chirp", states=[hs.State("x", 0, f"{force} - x", nominal=1)])
+    with pytest.raises(UsageError, match="state x, der does not repeat after the period 1:"):
+        hs.steady_state(chirp, period=1.0)
+
+
+def test_a_sine_of_linear_time_is_periodic_in_any_form() -> None:
+    """x' = -x + sin(2 pi t + 1) has the amplitude 1/sqrt(1 + 4 pi^2)."""
+    driven = hs.Model("driven", states=[hs.State("x", 0, "sin(-(2*pi*(-t - 1/(2*pi)))) - x", nominal=1)])
+    found = hs.steady_state(driven, period=1.0)
+    assert found.amplitude["x"] == pytest.approx((1.0 + 4.0 * math.pi**2) ** -0.5, rel=1e-9)
+
+
 def test_a_period_that_is_not_the_forcings_is_refused() -> None:
     with pytest.raises(UsageError, match=r"0\.0148"):
         hs.steady_state("dfcs", period=0.01)
