@@ -14,6 +14,7 @@ _ROUND = 4  # repetitions after which the growth is measured
 _MOST = 32  # rounds
 _CLEAR = 0.1  # distance from one of a growth that needs few digits
 _EQUAL = (0.05, 5e-5)  # difference of two growths that have converged, clearly away from one and near one
+_IN_A_ROW = 2  # equal growths
 _GONE = 1e-3  # smallest change that matters, relative to the first one
 _NEUTRAL = 2e-4  # growth per repetition that is allowed, as of a direction in which a contact sticks anywhere
 
@@ -21,24 +22,30 @@ _NEUTRAL = 2e-4  # growth per repetition that is allowed, as of a direction in w
 def grows(period_map: PeriodMap, scale: np.ndarray, multiple: int, direction: np.ndarray) -> bool:
     """Return whether a disturbance (n,) of a repeating motion grows; if it decays, restore the map.
 
-    After some repetitions the change is in the direction that shrinks least or grows fastest. Its growth over a
-    repetition then converges to the size of the largest multiplier. The motion is followed with and without the
-    change until the growth has converged, or the change is gone. If the change grows, the map goes on from the
-    changed states.
+    After some repetitions the change is in the direction, or in the plane of a complex pair, that shrinks least or
+    grows fastest. Three changes in a row then determine the largest multipliers. The motion is followed with and
+    without the change until their size has converged, or the change is gone. A clear decay alone decides nothing: it
+    may hide a small part that grows. If the change grows, the map goes on from the changed states.
     """
     start = plain = period_map.snapshot()
-    period_map.put(period_map.x + _CHANGE * direction / relative(direction, scale))
+    change = _CHANGE * direction / relative(direction, scale)
+    period_map.put(period_map.x + change)
     changed = period_map.snapshot()
     used = scale > 0.0
-    size, growth = _CHANGE, np.inf
+    changes, growth, equal = [change[used] / scale[used]], np.inf, 0
     for k in range(_MOST):
         plain, x = _followed(period_map, plain, _ROUND * multiple)
         changed, y = _followed(period_map, changed, _ROUND * multiple)
-        former, earlier = size, growth
-        size = float(np.linalg.norm((y - x)[used] / scale[used]))
-        growth = (size / former) ** (1.0 / _ROUND) if size > 0.0 else 0.0
-        is_clear = abs(growth - 1.0) > _CLEAR
-        if size <= _GONE * _CHANGE or (k > 0 and abs(growth - earlier) < _EQUAL[0 if is_clear else 1]):
+        changes.append((y - x)[used] / scale[used])
+        if np.linalg.norm(changes[-1]) <= _GONE * _CHANGE:
+            growth = 0.0
+            break
+        if k == 0:
+            continue
+        earlier, growth = growth, _largest_root(*changes[-3:]) ** (1.0 / _ROUND)
+        is_equal = abs(growth - earlier) < _EQUAL[0 if abs(growth - 1.0) > _CLEAR else 1]
+        equal = equal + 1 if is_equal else 0
+        if equal == _IN_A_ROW and growth >= 1.0 - _CLEAR:
             break
     if growth > 1.0 + _NEUTRAL:
         return True
@@ -52,3 +59,10 @@ def _followed(period_map: PeriodMap, start: Any, periods: int) -> tuple[Any, np.
     for _ in range(periods):
         period_map.advance()
     return period_map.snapshot(), period_map.x
+
+
+def _largest_root(first: np.ndarray, second: np.ndarray, third: np.ndarray) -> float:
+    """Return the largest |z| with z**2 = a z + b, where third = a second + b first is the best fit."""
+    unit = np.linalg.norm(second)
+    a, b = np.linalg.lstsq(np.column_stack([second, first]) / unit, third / unit, rcond=None)[0]
+    return float(np.abs(np.roots([1.0, -a, -b])).max())
