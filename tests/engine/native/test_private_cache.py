@@ -232,7 +232,8 @@ def test_files_that_are_cut_short_are_made_again(full: Place) -> None:
         os.truncate(path, size // 2)
         os.utime(path, (time.time() - 100, time.time() - 100))
     done = full.run()
-    assert done.stdout == "-0.25\n" and "Traceback" not in done.stderr
+    assert done.returncode == 0 and done.stdout == "-0.25\n", (done.returncode, done.stderr)
+    assert "Traceback" not in done.stderr
     for path, size in sizes.items():
         assert path.suffix in (".cache", ".pyc") or path.stat().st_size == size, path
 
