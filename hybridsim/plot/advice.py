@@ -33,7 +33,7 @@ _COLOURS = {
 
 
 def advice(found: Advice, axes: Axes | None = None) -> Axes:
-    """Draw the result of `advise`: the simplified models of one scene, or the map of a parameter region.
+    """Draw the result of `advise`: the simplified models of one test case, or the map of a parameter region.
 
     In the ladder a stem leads from the tolerance to the error of each rung. An adequate rung has a filled
     marker on the left, and an arrow marks an error beyond the axis. The error and the cost are written next

@@ -1,4 +1,4 @@
-"""This module draws the comparison suite on one page: a small chart per scene, and one legend."""
+"""This module draws the comparison suite on one page: a small chart per test case, and one legend."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _MARKER = 4.5
 
 
 def suite_page(suite: SuiteComparison) -> tuple[Axes, ...]:
-    """Draw the largest error of the states over the run against the wall time, scene by scene.
+    """Draw the largest error of the states over the run against the wall time, test case by test case.
 
     Runs with a wrong sequence of modes are hollow and at the top edge. Dashed lines show SciPy's own event
     finding, or the refined form of the published method, in the colour of the solid line.
@@ -53,7 +53,7 @@ def suite_page(suite: SuiteComparison) -> tuple[Axes, ...]:
 
 
 def _headline(comparisons: Sequence[Comparison]) -> str:
-    """Return the number of scenes in which each method is the cheapest, as text."""
+    """Return the number of test cases in which each method is the cheapest, as text."""
     from hybridsim.analysis.compare.table import TARGET, fastest
 
     firsts = Counter(row.label for one in comparisons if (row := fastest(one.rows)) is not None)

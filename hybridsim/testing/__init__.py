@@ -1,4 +1,4 @@
-"""This package tests integrators on scenes with known answers, and explains their failures."""
+"""This package tests integrators on test cases with known answers, and explains their failures."""
 
 from hybridsim.testing.catalogue import SCENES
 from hybridsim.testing.scene import END, TOLERANCES, TROUBLES, VOCABULARY, Scene, Truth

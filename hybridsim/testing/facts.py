@@ -1,4 +1,4 @@
-"""Published and recomputed results with which the scenes are compared."""
+"""Published and recomputed results with which the test cases are compared."""
 
 from __future__ import annotations
 

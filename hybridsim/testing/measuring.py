@@ -1,4 +1,4 @@
-"""Run a scene with one setting of an integrator, and compare the result with the truth."""
+"""Run a test case with one setting of an integrator, and compare the result with the truth."""
 
 from __future__ import annotations
 
@@ -53,13 +53,13 @@ def label(event: Any) -> str:
 
 
 def load(scene: Scene) -> Any:
-    """Return the model that a scene names."""
+    """Return the model that a test case names."""
     path = SCENES / f"{scene.file}.toml"
     return hs.load(str(path) if path.exists() else scene.file)
 
 
 def model_of(scene: Scene, form: str, settings: dict[str, Any]) -> Any:
-    """Return the model of a scene, or a regularized form of the model with the width `settings["v0"]`."""
+    """Return the model of a test case, or a regularized form of the model with the width `settings["v0"]`."""
     model = load(scene)
     return model.regularized(form, v0=settings.pop("v0")) if form else model
 
@@ -81,7 +81,7 @@ def prepare(scene: Scene, integrator: str, form: str = "", **settings: Any) -> N
 def run(
     scene: Scene, integrator: str, form: str = "", processor_seconds: float = inf, **settings: Any
 ) -> Any:
-    """Simulate the scene, or its regularized form with the width v0 of the settings."""
+    """Simulate the test case, or its regularized form with the width v0 of the settings."""
     model = model_of(scene, form, settings)
     return hs.simulate(
         model,

@@ -43,7 +43,7 @@ END = math.inf  # as the time of a state: the end of the run
 
 
 def needs(*capabilities: str) -> frozenset[str]:
-    """Return the capabilities that a scene needs."""
+    """Return the capabilities that a test case needs."""
     return frozenset(capabilities)
 
 
@@ -52,7 +52,7 @@ Check = Callable[[Any], list[str]]  # a solution -> its errors as sentences
 
 @dataclass(frozen=True)
 class Truth:
-    """The known answer of a scene.
+    """The known answer of a test case.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ class Truth:
 
 @dataclass(frozen=True)
 class Scene:
-    """A model, a run of the model, and the known answer.
+    """A scene is a test case: a model, a run of the model, and the known answer.
 
     Parameters
     ----------
@@ -133,5 +133,5 @@ class Scene:
 
 
 def named(name: str, span: tuple[float, float], truth: Truth, *rest: Any, **more: Any) -> Scene:
-    """Return a scene with the name of its model file; other arguments are passed on to `Scene`."""
+    """Return a test case with the name of its model file; other arguments are passed on to `Scene`."""
     return Scene(name, name, span, truth, *rest, **more)

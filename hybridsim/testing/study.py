@@ -1,4 +1,4 @@
-"""Study of a scene with an integrator: runs with decreasing tolerances, each compared with the truth."""
+"""Study of a test case with an integrator: runs with decreasing tolerances, each compared with the truth."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class Setting:
 
 @dataclass(frozen=True)
 class Study:
-    """The runs of one scene with one integrator.
+    """The runs of one test case with one integrator.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def lacking(one: type[Integrator]) -> dict[str, str]:
 
 
 def settings_for(one: type[Integrator], scene: Scene) -> tuple[Setting, ...]:
-    """Return the settings for a scene, from loose to tight."""
+    """Return the settings for a test case, from loose to tight."""
     if "adaptive" not in one.lacks:
         is_long = abs(scene.span[1] - scene.span[0]) > LONG * scene.unit
         factor = LOW_ORDER if one.order == "3(2)" and is_long else 1.0
@@ -143,7 +143,7 @@ def carry_out(
     seconds: float = LONGEST,
     **options: Any,
 ) -> Study:
-    """Run a scene at all useful settings; `seconds` limits the processor time of each run."""
+    """Run a test case at all useful settings; `seconds` limits the processor time of each run."""
     done: list[tuple[Setting, measuring.Measured]] = []
     waiting = list(settings)
     while waiting:

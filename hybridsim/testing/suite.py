@@ -1,4 +1,4 @@
-"""Test an integrator in all scenes: `conformance_failures(integrator)` returns its errors.
+"""Test an integrator in all test cases: `conformance_failures(integrator)` returns its errors.
 
 A scene is judged as its facts ask. Events are counted and their modes compared at every setting. The largest
 errors of event times and of states fall with the tolerance, tenfold or more for each step of a thousand, where
@@ -28,7 +28,7 @@ from hybridsim.testing.verdict import LACKS, RIGHT, WRONG_ANSWER, verdict
 
 @dataclass(frozen=True)
 class Outcome:
-    """The verdict on one integrator in one scene.
+    """The verdict on one integrator in one test case.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ class Outcome:
 
 
 def outcome(method: str | type[Integrator], scene: Scene, **options: Any) -> Outcome:
-    """Run one scene with one integrator at all settings, and return the verdict with its reason.
+    """Run one test case with one integrator at all settings, and return the verdict with its reason.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""This module evaluates the simplified models of one scene: value, error, cost and verdict of each."""
+"""This module evaluates the simplified models of one test case: value, error, cost and verdict of each."""
 
 from __future__ import annotations
 

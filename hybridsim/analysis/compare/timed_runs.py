@@ -1,4 +1,4 @@
-"""This module makes all runs of one or several scenes within a time budget: first runs, then timed repetitions."""
+"""This module makes all runs of one or several test cases within a time budget: first runs, then timed repetitions."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Budget:
 
 @dataclass(frozen=True)
 class Entry:
-    """A scene with its reference and the series of runs to make on it."""
+    """A test case with its reference and the series of runs to make on it."""
 
     case: PreparedCase
     reference: Reference

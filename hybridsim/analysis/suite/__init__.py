@@ -1,4 +1,4 @@
-"""This package compares all integrators on benchmark scenes, each of which shows one kind of error."""
+"""This package compares all integrators on test cases, each of which shows one kind of error."""
 
 from hybridsim.analysis.suite.result import SuiteComparison
 from hybridsim.analysis.suite.running import compare_suite

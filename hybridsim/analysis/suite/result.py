@@ -1,4 +1,4 @@
-"""This module defines the result of the comparison suite: one comparison per scene, and overall verdicts."""
+"""This module defines the result of the comparison suite: one comparison per test case, and overall verdicts."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ ACCURACIES = (1e-3, 1e-6, 1e-9, 1e-11)
 
 @dataclass(frozen=True)
 class SceneResult:
-    """One scene of the suite, and the comparison of the integrators on this scene."""
+    """One test case of the suite, and the comparison of the integrators on this test case."""
 
     scene: Scene
     comparison: Comparison
@@ -48,7 +48,7 @@ class SceneResult:
 
 @dataclass(frozen=True)
 class SuiteComparison(Readable):
-    """The comparison of all integrators on all scenes.
+    """The comparison of all integrators on all test cases.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ class SuiteComparison(Readable):
     seconds: float
 
     def plot(self) -> Any:
-        """Draw a small chart of error against cost for each scene; see `hybridsim.plot.suite_page`.
+        """Draw a small chart of error against cost for each test case; see `hybridsim.plot.suite_page`.
 
         It returns the axes; ``hybridsim.plot.save`` writes them to a file.
         """
@@ -88,7 +88,7 @@ class SuiteComparison(Readable):
         return tuple(dict.fromkeys(label for result in self.results for label in result.comparison.labels))
 
     def verdicts(self) -> dict[str, dict[str, Verdict]]:
-        """Return the verdict for each scene and series at a common tolerance."""
+        """Return the verdict for each test case and series at a common tolerance."""
         return {
             result.scene.name: {
                 label: verdict(result.scene, [row for row in result.comparison.rows if row.label == label])
@@ -98,7 +98,7 @@ class SuiteComparison(Readable):
         }
 
     def cheapest(self, accuracies: Sequence[float] = ACCURACIES) -> dict[str, dict[float, Row | None]]:
-        """Return the cheapest row for each scene and accuracy, or None."""
+        """Return the cheapest row for each test case and accuracy, or None."""
         accuracies = positives(accuracies, "accuracies") or ()
         return {
             result.scene.name: {accuracy: result.cheapest(accuracy) for accuracy in accuracies}
@@ -143,7 +143,7 @@ class SuiteComparison(Readable):
         return printable("\n\n".join("\n".join(block) for block in blocks))
 
     def to_csv(self, path: str | Path) -> None:
-        """Write one line per run of any scene; times are in the model's unit, wall times in seconds."""
+        """Write one line per run of any test case; times are in the model's unit, wall times in seconds."""
         rows = ((result.scene.name, row) for result in self.results for row in result.comparison.records())
         csv_records(path, [{"scene": scene, **row} for scene, row in rows])
 

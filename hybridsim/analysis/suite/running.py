@@ -47,7 +47,7 @@ def compare_suite(
     budget: float = BUDGET,
     progress: Progress | bool | None = None,
 ) -> SuiteComparison:
-    """Run the scenes of the suite with several integrators at several settings, and compare correctness and cost.
+    """Run the test cases of the suite with several integrators at several settings, and compare correctness and cost.
 
     Every scene has a reference that is independent of the engine, a closed form or a multiple-precision
     motion, and a second one by the most accurate integrator. The result gives the distance between the two.

@@ -1,4 +1,4 @@
-"""This module lists the scenes of the comparison suite, and the kind of error that each scene shows."""
+"""This module lists the test cases of the comparison suite, and the kind of error that each test case shows."""
 
 from __future__ import annotations
 
@@ -111,5 +111,5 @@ SCENES: tuple[Scene, ...] = (
 
 
 def scene_names() -> tuple[str, ...]:
-    """Return the names of the scenes, in order."""
+    """Return the names of the test cases, in order."""
     return tuple(scene.name for scene in SCENES)

@@ -1,4 +1,4 @@
-"""This module classifies the result of an integrator on a scene."""
+"""This module classifies the result of an integrator on a test case."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ USELESS = 0.1
 
 
 class Verdict(Enum):
-    """Whether the run of an integrator on a scene is right, and the reason if it is wrong."""
+    """Whether the run of an integrator on a test case is right, and the reason if it is wrong."""
 
     RIGHT = "right"
     OFF = "off"

@@ -1,4 +1,4 @@
-"""`hybridsim atlas [SCENE ...]`: run every integrator on the benchmark scenes and report each failure."""
+"""`hybridsim atlas [SCENE ...]`: run every integrator on the test cases of the benchmark and report each failure."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def add_to(commands: Any) -> None:
 
 
 def execute(args: argparse.Namespace, session: Session) -> int:
-    """Run the scenes, print a table of counts and write the results."""
+    """Run the test cases, print a table of counts and write the results."""
     if args.scenes and args.trouble:
         raise UsageError(
             "Names of scenes and --class cannot be combined", remedy="remove --class or the names"
@@ -115,7 +115,7 @@ def _write(result: Atlas, folder: Path, session: Session, progress: Progress) ->
 
 
 def _pictures(result: Atlas, folder: Path, progress: Progress) -> set[str]:
-    """Draw each scene into the folder of its class, and return the names of the drawn scenes."""
+    """Draw each test case into the folder of its class, and return the names of the drawn test cases."""
     from hybridsim.plot.atlas import save_small
     from hybridsim.plot.atlas import scene as picture
     from hybridsim.testing.atlas import example

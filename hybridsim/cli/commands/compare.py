@@ -1,4 +1,4 @@
-"""`hybridsim compare`: compare error and run time of integrators on one model, or on a suite of scenes."""
+"""`hybridsim compare`: compare error and run time of integrators on one model, or on a suite of test cases."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""This module draws the matrix of the atlas: scenes against integrators, with verdict symbols."""
+"""This module draws the matrix of the atlas: test cases against integrators, with verdict symbols."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ _NARROWEST = 3.0  # inches that the legend needs
 
 
 def matrix(result: Atlas) -> Axes:
-    """Draw the matrix, with one row per scene, grouped by class, and one column per integrator."""
+    """Draw the matrix, with one row per test case, grouped by class, and one column per integrator."""
     groups = result.by_class()
     rows = sum(len(scenes) for scenes in groups.values()) + len(groups)
     columns = len(result.configurations)

@@ -1,4 +1,4 @@
-"""This module draws the small picture of a scene: the true motion with its events, and a typical failure."""
+"""This module draws the small picture of a test case: the true motion with its events, and a typical failure."""
 
 from __future__ import annotations
 

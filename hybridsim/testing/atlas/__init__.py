@@ -1,4 +1,4 @@
-"""The atlas: results of every integrator in every scene, with the reasons of failures."""
+"""The atlas: results of every integrator in every test case, with the reasons of failures."""
 
 from hybridsim.testing.atlas.cell import Cell, Row
 from hybridsim.testing.atlas.configurations import Configuration, configurations

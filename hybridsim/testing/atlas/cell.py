@@ -1,4 +1,4 @@
-"""One cell of the atlas: one scene, run by one method within a time limit."""
+"""One cell of the atlas: one test case, run by one method within a time limit."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Cell:
-    """The verdict on one method in one scene.
+    """The verdict on one method in one test case.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ class Cell:
 
 
 def run_cell(scene: Scene, configuration: Configuration, quick: bool = False) -> Cell:
-    """Run one scene with one method; `quick` runs only the loosest setting of the study."""
+    """Run one test case with one method; `quick` runs only the loosest setting of the study."""
     reason = configuration.applies(scene)
     length = abs(scene.span[1] - scene.span[0]) / scene.unit
     if not reason and length > LONG and length < 1e6 and not configuration.is_compiled:
@@ -127,7 +127,7 @@ def loosened(tolerances: tuple[float, float], setting: Setting) -> tuple[float, 
 
 
 def seen_by(scene: Scene, configuration: Configuration) -> Scene:
-    """Return the scene in the form that a method can solve; for regularized contacts, modes are not compared."""
+    """Return the test case in the form that a method can solve; for regularized contacts, modes are not compared."""
     if not configuration.form:
         return scene
     truth = scene.truth

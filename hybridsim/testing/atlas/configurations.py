@@ -105,7 +105,7 @@ class Configuration:
         return allowed_errors(self.method, scene)
 
     def applies(self, scene: Scene) -> str:
-        """Return the reason why a scene is not run, or an empty string."""
+        """Return the reason why a test case is not run, or an empty string."""
         if self.form and not measuring.load(scene).contacts:
             return "the model has no friction contact to regularize"
         if self.form and not scene.truth.states:

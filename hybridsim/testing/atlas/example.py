@@ -1,4 +1,4 @@
-"""Examples for the pictures of the atlas: a typical failure in a scene, next to a correct run."""
+"""Examples for the pictures of the atlas: a typical failure in a test case, next to a correct run."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class Example:
 
 
 def example(result: Atlas, scene: Scene) -> Example | None:
-    """Return the example of a scene, or None if no method is correct or no difference is visible."""
+    """Return the example of a test case, or None if no method is correct or no difference is visible."""
     by_name = {one.name: one for one in result.configurations}
     trusted = [
         by_name[name]
@@ -83,7 +83,7 @@ def example(result: Atlas, scene: Scene) -> Example | None:
 
 
 def typical_failure(cells: list[Cell]) -> Cell | None:
-    """Return the failure to show for a scene; a wrong result is preferred to a run that was aborted."""
+    """Return the failure to show for a test case; a wrong result is preferred to a run that was aborted."""
     for verdicts in (WRONG, (HANG,)):
         found = [cell for cell in cells if cell.verdict in verdicts]
         found.sort(

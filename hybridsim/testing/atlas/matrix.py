@@ -1,4 +1,4 @@
-"""The matrix of the atlas: all scenes with all methods, run on several processors."""
+"""The matrix of the atlas: all test cases with all methods, run on several processors."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ Progress = Callable[[float, str], None]
 
 @dataclass(frozen=True)
 class Atlas:
-    """The verdicts on all methods in all scenes.
+    """The verdicts on all methods in all test cases.
 
     Parameters
     ----------
@@ -43,19 +43,19 @@ class Atlas:
     interrupted: bool = False
 
     def row(self, scene: Scene) -> list[Cell]:
-        """Return the results in one scene, in the order of the methods."""
+        """Return the results in one test case, in the order of the methods."""
         return [self.cells[scene.name, one.name] for one in self.configurations]
 
     def column(self, configuration: Configuration) -> list[Cell]:
-        """Return the cells of a method, in the order of the scenes."""
+        """Return the cells of a method, in the order of the test cases."""
         return [self.cells[scene.name, configuration.name] for scene in self.scenes]
 
     def by_class(self) -> dict[str, list[Scene]]:
-        """Return the scenes of each class, in the order of the classes."""
+        """Return the test cases of each class, in the order of the classes."""
         return by_class(self.scenes)
 
     def table(self) -> str:
-        """Return the number of scenes with each verdict, for every method, as text."""
+        """Return the number of test cases with each verdict, for every method, as text."""
         width = max(len(one.name) for one in self.configurations)
         lines = [f"{'':{width}}  " + "  ".join(VERDICTS)]
         for one in self.configurations:
@@ -67,7 +67,7 @@ class Atlas:
         return "\n".join(lines)
 
     def to_plain(self) -> dict[str, Any]:
-        """Return plain data: scenes, methods, and a cell for each pair."""
+        """Return plain data: test cases, methods, and a cell for each pair."""
         return {
             "limits": {"seconds": SECONDS, "steps": STEPS},
             "scenes": [described(scene) for scene in self.scenes],
@@ -86,7 +86,7 @@ class Atlas:
 
     @classmethod
     def from_json(cls, text: str) -> Atlas:
-        """Return an atlas from the JSON text of `to_json`, with the current descriptions of the scenes."""
+        """Return an atlas from the JSON text of `to_json`, with the current descriptions of the test cases."""
         record = json.loads(text)
         scenes = {scene.name: scene for scene in SCENES}
         found = [Cell.from_plain(cell) for cell in record["cells"]]
@@ -105,7 +105,7 @@ def atlas(
     workers: int = 1,
     progress: Progress | None = None,
 ) -> Atlas:
-    """Run scenes with methods and return the matrix of verdicts.
+    """Run test cases with methods and return the matrix of verdicts.
 
     Parameters
     ----------
@@ -160,7 +160,7 @@ def atlas(
 
 
 def scenes_named(names: Sequence[str], trouble: str = "") -> tuple[Scene, ...]:
-    """Return the packaged scenes with the given names, or of one class; without arguments, all scenes."""
+    """Return the packaged test cases with the given names, or of one class; without arguments, all test cases."""
     known = {scene.name: scene for scene in SCENES}
     if trouble:
         known_name(trouble, list(TROUBLES), "Unknown class of scenes", "classes")
@@ -171,18 +171,18 @@ def scenes_named(names: Sequence[str], trouble: str = "") -> tuple[Scene, ...]:
 
 
 def by_class(scenes: Sequence[Scene]) -> dict[str, list[Scene]]:
-    """Return the scenes of each class, in the order of the classes."""
+    """Return the test cases of each class, in the order of the classes."""
     found = {trouble: [one for one in scenes if one.trouble == trouble] for trouble in (*TROUBLES, "")}
     return {trouble: those for trouble, those in found.items() if those}
 
 
 def described(scene: Scene) -> dict[str, str]:
-    """Return the description of a scene as plain data."""
+    """Return the description of a test case as plain data."""
     return {"name": scene.name, "class": scene.trouble, "title": scene.title, "cause": scene.cause}
 
 
 def listing(scenes: Sequence[Scene]) -> str:
-    """Return names and titles of scenes by class, as text."""
+    """Return names and titles of test cases by class, as text."""
     width = max(len(scene.name) for scene in scenes)
     return "\n\n".join(
         "\n".join(

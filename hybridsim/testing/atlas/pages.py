@@ -1,4 +1,4 @@
-"""The pages of the atlas: an index with the matrix, and one page for each class of scenes."""
+"""The pages of the atlas: an index with the matrix, and one page for each class of test cases."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ _RUBBING = "For friction at a hard stop, see the scene `rubbing-stop` and `hybri
 
 
 def pages(result: Atlas, pictures: Collection[str] = ()) -> dict[str, str]:
-    """Return the Markdown text of each page; `pictures` names the scenes that have a picture."""
+    """Return the Markdown text of each page; `pictures` names the test cases that have a picture."""
     groups = result.by_class()
     found = {"index.md": index(result, groups)}
     for trouble, scenes in groups.items():
@@ -144,7 +144,7 @@ def anchor(title: str) -> str:
 
 
 def page(result: Atlas, trouble: str, scenes: list[Scene], pictures: Collection[str] = ()) -> str:
-    """Return the Markdown text of the page on one class of scenes."""
+    """Return the Markdown text of the page on one class of test cases."""
     sentence, table = _failures(result, scenes)
     opening = f"{_QUESTIONS.get(trouble, '')} {sentence} {_FAILURE}"
     lines = [f"# {TROUBLES.get(trouble, 'Scenes')}", "", _filled(opening), "", *table, ""]
@@ -160,7 +160,7 @@ def page(result: Atlas, trouble: str, scenes: list[Scene], pictures: Collection[
 
 
 def _overall(result: Atlas) -> str:
-    """Return a sentence on the number of scenes and on the methods that are right in all scenes."""
+    """Return a sentence on the number of test cases and on the methods that are right in all test cases."""
     right = [
         f"`{one.name}`"
         for one in result.configurations
@@ -172,7 +172,7 @@ def _overall(result: Atlas) -> str:
 
 
 def _failures(result: Atlas, scenes: Sequence[Scene]) -> tuple[str, list[str]]:
-    """Return the number of scenes without a failure as a sentence, and a table of methods by their failures."""
+    """Return the number of test cases without a failure as a sentence, and a table of methods by their failures."""
     failed = {
         one.name: {scene.name for scene in scenes if result.cells[scene.name, one.name].verdict in _FAILURES}
         for one in result.configurations
@@ -191,7 +191,7 @@ def _filled(text: str) -> str:
 
 
 def verdicts(cells: list[Cell], configurations: Sequence[Configuration] = ()) -> list[str]:
-    """Return the verdicts on one scene: the methods that are right, and a line for each other method."""
+    """Return the verdicts on one test case: the methods that are right, and a line for each other method."""
     lacks = {one.name: one.method.lacks for one in configurations}
     right = [cell for cell in cells if cell.verdict == RIGHT]
     lines = ["| | |", "| --- | --- |"]

@@ -1,4 +1,4 @@
-"""The packaged scenes, by class of trouble."""
+"""The packaged test cases, by class of trouble."""
 
 from __future__ import annotations
 

@@ -11,12 +11,12 @@ from hybridsim.testing.scene import Scene, Truth, named, needs
 
 
 def scenes() -> tuple[Scene, ...]:
-    """Return all scenes of accumulating events."""
+    """Return all test cases of accumulating events."""
     return *_ball(), _twisting(), *_tanks()
 
 
 def _twisting() -> Scene:
-    """Return the scene of a twisting motion, in which each half turn is sqrt(3) times shorter than the last one."""
+    """Return the test case of a twisting motion, in which each half turn is sqrt(3) times shorter than the last one."""
     half, end = 4 * math.sqrt(2) / 3, 4 * math.sqrt(2) / 3 / (1 - 1 / math.sqrt(3))
     first, second = half, half * (1 + 1 / math.sqrt(3))
 
@@ -47,7 +47,7 @@ def _twisting() -> Scene:
 
 
 def _tanks() -> tuple[Scene, ...]:
-    """Return scenes of two water tanks, in which each visit of the hose is half as long as the last one."""
+    """Return test cases of two water tanks, in which each visit of the hose is half as long as the last one."""
     t, x = 2.0, [0.5, 0.0]  # the second tank is low
     events, low, left = [(t, "hose:second")], 1, 1e-4
     states = [(1.0, (0.25, 0.5)), (3.0, (0.0, 0.25))]

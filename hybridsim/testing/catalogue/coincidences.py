@@ -9,7 +9,7 @@ from hybridsim.testing.scene import END, Scene, Truth, named, needs
 
 
 def scenes() -> tuple[Scene, ...]:
-    """Return scenes of guards that coincide, are zero at the start or are flat, and of resets onto guards."""
+    """Return test cases of guards that coincide, are zero at the start or are flat, and of resets onto guards."""
     after = ("a:after", "b:after")
     return (
         Scene(

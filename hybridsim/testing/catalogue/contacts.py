@@ -11,7 +11,7 @@ from hybridsim.testing.scene import Scene, Truth, named, needs
 
 
 def scenes() -> tuple[Scene, ...]:
-    """Return scenes of contacts with other laws, of a contact on a belt, and of several contacts at once."""
+    """Return test cases of contacts with other laws, of a contact on a belt, and of several contacts at once."""
 
     def belt(name: str, delta: float) -> Scene:
         events, states = recomputed(name)
@@ -56,7 +56,7 @@ def scenes() -> tuple[Scene, ...]:
 
 
 def tied() -> Scene:
-    """Return the scene of two contacts that reach their limits together, of which only one releases."""
+    """Return the test case of two contacts that reach their limits together, of which only one releases."""
     release, own, forced = math.asin(0.4) / 4, math.sqrt(30), 7.5 / 14
 
     def after(t: float) -> tuple[float, float]:
@@ -79,7 +79,7 @@ def tied() -> Scene:
 
 
 def turning_belt() -> Scene:
-    """Return the scene of a belt whose speed jumps, so that the body slips."""
+    """Return the test case of a belt whose speed jumps, so that the body slips."""
     turns = ["f:stick", "f:slip+", "f:slip-"]
     states = ((0.5, (0.5,)), (1.5, (1.0,)), (3.25, (-0.5,)), (4.5, (0.25,)))
     return named(

@@ -9,12 +9,12 @@ from hybridsim.testing.scene import Scene, Truth, named, needs
 
 
 def scenes() -> tuple[Scene, ...]:
-    """Return scenes of a bilinear spring, backlash, saturation, drag, a hinge and an elastogap."""
+    """Return test cases of a bilinear spring, backlash, saturation, drag, a hinge and an elastogap."""
     return _bilinear(), _backlash(), _saturation(), _drag(), _hinge(), _elastogap(), _sizes()
 
 
 def _bilinear() -> Scene:
-    """Return the scene of a bilinear oscillator with half periods of pi/2 and pi."""
+    """Return the test case of a bilinear oscillator with half periods of pi/2 and pi."""
     period = 1.5 * math.pi
     quarter, root = math.pi / 4, math.sqrt(0.5)
     states = (
@@ -28,7 +28,7 @@ def _bilinear() -> Scene:
 
 
 def _backlash() -> Scene:
-    """Return the scene of backlash: free flights alternate with half periods of a spring of frequency 2."""
+    """Return the test case of backlash: free flights alternate with half periods of a spring of frequency 2."""
     half = math.pi / 2
     states = (
         (0.5, (0.5, 1.0)),
@@ -41,7 +41,7 @@ def _backlash() -> Scene:
 
 
 def _saturation() -> Scene:
-    """Return the scene of the integral of 2 sin(t), clipped to 1 between pi/6 and 5 pi/6."""
+    """Return the test case of the integral of 2 sin(t), clipped to 1 between pi/6 and 5 pi/6."""
     rise = 2 * (1 - math.cos(math.pi / 6))
     top = rise + 2 * math.pi / 3
     states = (
@@ -55,7 +55,7 @@ def _saturation() -> Scene:
 
 
 def _drag() -> Scene:
-    """Return the scene of quadratic drag: v = vt tan upward, v = -vt tanh downward, with terminal speed vt."""
+    """Return the test case of quadratic drag: v = vt tan upward, v = -vt tanh downward, with terminal speed vt."""
     g, c, v0 = 9.81, 0.3, 5.0
     terminal = math.sqrt(g / c)
     rate = math.sqrt(g * c)
@@ -75,13 +75,13 @@ def _hinge() -> Scene:
 
 
 def _elastogap() -> Scene:
-    """Return the scene MSL-elastogap, declared with corners instead of modes."""
+    """Return the test case MSL-elastogap, declared with corners instead of modes."""
     states = tuple((row[0], tuple(row[1:])) for row in TRUTHS["MSL-elastogap"]["states"])
     return named("elastogap-clipped", (0.0, 5.0), Truth((), states), unit=2.0, speed=3.0, tol_x=1e-7)
 
 
 def _sizes() -> Scene:
-    """Return the scene of nested absolute values with known zeros: x = 1.06, y = -0.86 and z = -1.75."""
+    """Return the test case of nested absolute values with known zeros: x = 1.06, y = -0.86 and z = -1.75."""
     events = ((0.04, "second:off"), (0.16, "first:off"), (0.25, "third:off"))
     return named(
         "sizes-of-sizes", (0.0, 1.0), Truth(events, ((1.0, (1.9, 0.1, -1.0)),)), needs("transitions")

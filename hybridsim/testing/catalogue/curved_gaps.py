@@ -8,12 +8,12 @@ from hybridsim.testing.scene import END, Scene, Truth, needs
 
 
 def scenes() -> tuple[Scene, ...]:
-    """Return all scenes of impacts with curved gaps."""
+    """Return all test cases of impacts with curved gaps."""
     return _drum(), _discs()
 
 
 def _drum() -> Scene:
-    """Return the scene of a ball in a round wall, which moves along chords of the circle."""
+    """Return the test case of a ball in a round wall, which moves along chords of the circle."""
     x, y, vx, vy = 0.3, 0.0, 0.4, 0.9
     blows: list[tuple[float, str]] = []
     t, end = 0.0, 6.0
@@ -41,7 +41,7 @@ def _drum() -> Scene:
 
 
 def _discs() -> Scene:
-    """Return the scene of two discs, whose impact exchanges the velocity components along their centres."""
+    """Return the test case of two discs, whose impact exchanges the velocity components along their centres."""
     instant = 1.0 - math.sqrt(0.2**2 - 0.1**2)
     normal = ((1.0 - instant) / 0.2, 0.1 / 0.2)
     taken = (normal[0] ** 2, normal[0] * normal[1])

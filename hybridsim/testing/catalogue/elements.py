@@ -11,7 +11,7 @@ from hybridsim.testing.scene import END, Check, Scene, Truth, needs
 
 
 def scenes() -> tuple[Scene, ...]:
-    """Return all scenes of elements that are declared in one line, and of guards with a direction."""
+    """Return all test cases of elements that are declared in one line, and of guards with a direction."""
     return _directions(), _elements(), _delays()
 
 
@@ -29,7 +29,7 @@ def _transitions(component: str, expected: Sequence[tuple[float, str]], within: 
 
 
 def _directions() -> Scene:
-    """Return the scene of x = sin(t), whose values 1/2 and 0 are passed in both directions."""
+    """Return the test case of x = sin(t), whose values 1/2 and 0 are passed in both directions."""
     opens, closes = 5 * math.pi / 6, 13 * math.pi / 6
     gate = ((opens, "open"), (closes, "closed"), (opens + 2 * math.pi, "open"))
     zeros = tuple((k * math.pi, "on") for k in (1, 2, 3))
@@ -57,7 +57,7 @@ def _directions() -> Scene:
 
 
 def _elements() -> Scene:
-    """Return the scene of elements that follow x = sin(t), with closed forms for their integrals until t = 10."""
+    """Return the test case of elements that follow x = sin(t), with closed forms for their integrals until t = 10."""
     end, sixth, three = 10.0, math.pi / 6, 3 * math.pi
     on = 2 * math.pi  # from 1/2 to -1/2, twice
     half_wave = 4 * math.sin(sixth / 2) ** 2 + 2 * sixth  # 2 (1 - cos(pi/6)) + (4 pi/6)/2
@@ -87,7 +87,7 @@ def _elements() -> Scene:
 
 
 def _delays() -> Scene:
-    """Return the scene of delayed signals: the sample is 0 on (0, 1), and sin(k - 1) on (k, k + 1)."""
+    """Return the test case of delayed signals: the sample is 0 on (0, 1), and sin(k - 1) on (k, k + 1)."""
     samples = sum(math.sin(k - 1) for k in range(1, 10))
     states = ((3.0, (math.sin(3.0), math.cos(3.0), math.sin(1.0), 1.0, 0.5)),)
     return Scene(

@@ -11,12 +11,12 @@ from hybridsim.testing.scene import END, Scene, Truth, named, needs
 
 
 def scenes() -> tuple[Scene, ...]:
-    """Return all scenes of event location."""
+    """Return all test cases of event location."""
     return *corridor(), *modes(), *monitored(), *grazing()
 
 
 def grazing() -> tuple[Scene, ...]:
-    """Return scenes of sin(t) with threshold 1 + 1e-6, without events, and 1 - 1e-6, with two crossings per maximum."""
+    """Return tests of sin(t) with threshold 1 + 1e-6, without events, and 1 - 1e-6, with two crossings per maximum."""
     gap = 1e-6
     half = math.acos(1 - gap)
     tops = [math.pi / 2 + 2 * math.pi * n for n in range(3)]
@@ -44,7 +44,7 @@ def grazing() -> tuple[Scene, ...]:
 
 
 def corridor() -> tuple[Scene, ...]:
-    """Return the scene BALL2D, a ball in a corridor, twice: with monitors and with guards."""
+    """Return the test case BALL2D, a ball in a corridor, twice: with monitors and with guards."""
     expected = CASES["BALL2D"]["expected"]
     floor, walls = expected["floor"], expected["walls"]
     states = ((2.0, (50 - 4.9 * 4, -19.6, 4.0, 2.0)), (15.0, (*expected["y_end"], expected["x_end"], 1.62)))
@@ -65,7 +65,7 @@ def corridor() -> tuple[Scene, ...]:
 
 
 def modes() -> tuple[Scene, ...]:
-    """Return scenes of automata with transversal crossings and with guards close to each other."""
+    """Return test cases of automata with transversal crossings and with guards close to each other."""
     gap_events, gap_states = recomputed("MSL-elastogap")
     relay_events, relay_states = recomputed("SIC-relayosc")
     circle = CASES["NOS-osc"]["expected"]
@@ -116,7 +116,7 @@ def modes() -> tuple[Scene, ...]:
 
 
 def monitored() -> tuple[Scene, ...]:
-    """Return scenes of monitors: directed, with several roots per step, at t0, at step ends, and with output grids."""
+    """Return tests of monitors: directed, with several roots per step, at t0, at step ends, and with output grids."""
     zeros = ((-6.0, "zero"), (-2.0, "zero"), (2.0, "zero"))
     sides = ((-6.0, "mode:above"), (-2.0, "mode:below"), (2.0, "mode:above"))
     values = ((-7.0, (-45.0,)), (0.0, (-24.0,)), (4.0, (120.0,)))

@@ -15,7 +15,7 @@ REST = FALL * (1 + E) / (1 - E)
 
 
 def scenes() -> tuple[Scene, ...]:
-    """Return all scenes of impacts with restitution."""
+    """Return all test cases of impacts with restitution."""
     return _bounce(), _bar(), _table()
 
 
@@ -69,7 +69,7 @@ _BOUNCES: dict[str, Any] = {
 
 
 def _bounce() -> Scene:
-    """Return the scene of a ball that bounces from t = 0.5 on, and comes to rest at t = 1.5."""
+    """Return the test case of a ball that bounces from t = 0.5 on, and comes to rest at t = 1.5."""
     states = (*((t, _height(t)) for t in (0.3, 0.8, 1.1, 1.3)), (END, (0.0, 0.0)))
     checks = (("", closes("p")), ("located", rests("p")), ("", equals(2.0, h=0.0, w=0.0)))
     return named(
@@ -81,7 +81,7 @@ def _bounce() -> Scene:
 
 
 def _bar() -> Scene:
-    """Return the scene of a bar that is hit at both ends at once, stays level, and bounces like a ball."""
+    """Return the test case of a bar that is hit at both ends at once, stays level, and bounces like a ball."""
     heights = ((t, _height(t)) for t in (0.3, 0.8, 1.1))
     states = (*((t, (h, h, w, w)) for t, (h, w) in heights), (END, (0.0,) * 4))
     checks = (
@@ -99,7 +99,7 @@ def _bar() -> Scene:
 
 
 def _table() -> Scene:
-    """Return the scene of a ball on a vibrating table, which rests and is thrown again."""
+    """Return the test case of a ball on a vibrating table, which rests and is thrown again."""
     truth = TRUTHS["vibrating-table"]
     end = 0.25  # a rest and a throw; later periods are the same
     states = tuple((float(row[0]), tuple(row[1:])) for row in truth["states"] if row[0] < end)

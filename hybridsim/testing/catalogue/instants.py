@@ -11,7 +11,7 @@ from hybridsim.testing.scene import Scene, Truth, named, needs
 
 
 def scenes() -> tuple[Scene, ...]:
-    """Return scenes of additive resets, zeros at clock ticks, touches, copied values and successive zeros."""
+    """Return test cases of additive resets, zeros at clock ticks, touches, copied values and successive zeros."""
     return (
         _doses(),
         _counting_balls(),
@@ -24,7 +24,7 @@ def scenes() -> tuple[Scene, ...]:
 
 
 def _doses() -> Scene:
-    """Return the scene of doses that decay as exp(-1.2 t); several doses are due at one instant."""
+    """Return the test case of doses that decay as exp(-1.2 t); several doses are due at one instant."""
     doses = ((0.0, 100.0), (3.0, 50.0), (6.0, 200.0), (12.0, 100.0))
 
     def amount(t: float) -> tuple[float, ...]:
@@ -42,7 +42,7 @@ def _doses() -> Scene:
 
 
 def _counting_balls() -> Scene:
-    """Return the scene of two balls that share a count of bounces and hit the ground simultaneously."""
+    """Return the test case of two balls that share a count of bounces and hit the ground simultaneously."""
     fall = math.sqrt(2.0 / 9.81)
     times = [fall * (1.0 + 2.0 * sum(0.8**i for i in range(1, k + 1))) for k in range(4)]
     events = tuple((t, f"{ball}:flight") for t in times for ball in ("one", "two"))
@@ -57,7 +57,7 @@ def _counting_balls() -> Scene:
 
 
 def _guard_and_tick() -> Scene:
-    """Return the scene of a ramp 0.7 t that reaches 0.21 at a clock tick, except for rounding."""
+    """Return the test case of a ramp 0.7 t that reaches 0.21 at a clock tick, except for rounding."""
     times = [0.3 * k for k in range(1, 11)]
     return Scene(
         "guard-at-each-tick",
@@ -76,7 +76,7 @@ def _guard_and_tick() -> Scene:
 
 
 def _carried_back() -> Scene:
-    """Return the scene of a monitor that touches zero without changing its sign."""
+    """Return the test case of a monitor that touches zero without changing its sign."""
     return Scene(
         "monitor-carried-back",
         "carried-back",
@@ -98,7 +98,7 @@ def _never_crossed(solution: Any) -> list[str]:
 
 
 def _samples() -> Scene:
-    """Return the scene of a sine that is sampled at each change by 2, and also at its extremes.
+    """Return the test case of a sine that is sampled at each change by 2, and also at its extremes.
 
     Whether these touches are sampled is open, and with them the first level on the way back.
     """
@@ -128,7 +128,7 @@ def _samples() -> Scene:
 
 
 def _copied() -> Scene:
-    """Return the scene of x = 10 - 11.3 cos(sqrt(3) t), whose copy decreases once x has reached 0.7."""
+    """Return the test case of x = 10 - 11.3 cos(sqrt(3) t), whose copy decreases once x has reached 0.7."""
     at, end = math.acos(9.3 / 11.3) / math.sqrt(3.0), 1.0
 
     def state(t: float) -> tuple[float, ...]:
@@ -146,7 +146,7 @@ def _copied() -> Scene:
 
 
 def _successive_zeros() -> Scene:
-    """Return the scene of three successive modes, each with a guard that is zero at t = 0.87/0.7."""
+    """Return the test case of three successive modes, each with a guard that is zero at t = 0.87/0.7."""
     at = 0.87 / 0.7
     return named(
         "chain-of-zeros",

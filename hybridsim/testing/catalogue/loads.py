@@ -11,7 +11,7 @@ from hybridsim.testing.scene import END, Scene, Truth, named, needs
 
 
 def scenes() -> tuple[Scene, ...]:
-    """Return all scenes of loads."""
+    """Return all test cases of loads."""
     return (
         _floor(),
         _touching(),
@@ -28,7 +28,7 @@ def scenes() -> tuple[Scene, ...]:
 
 
 def _floor() -> Scene:
-    """Return the scene of a bounce on a spring, with friction that slows the speed along the floor."""
+    """Return the test case of a bounce on a spring, with friction that slows the speed along the floor."""
     g, k, mu, end = 9.81, 1000.0, 0.3, 0.3
     own, down, start = math.sqrt(k), math.sqrt(2 * g * 0.1), math.sqrt(2 * 0.1 / g)
 
@@ -49,7 +49,7 @@ def _floor() -> Scene:
 
 
 def _touching() -> Scene:
-    """Return the scene of a load that touches zero; the friction impulse is the area under the load."""
+    """Return the test case of a load that touches zero; the friction impulse is the area under the load."""
     return named(
         "touching-load",
         (0.0, 2.0),
@@ -60,7 +60,7 @@ def _touching() -> Scene:
 
 
 def _waves() -> Scene:
-    """Return the scene of a triangular load that touches zero, with a known friction impulse."""
+    """Return the test case of a triangular load that touches zero, with a known friction impulse."""
     return named(
         "load-of-waves",
         (0.0, 2.0),
@@ -75,7 +75,7 @@ def _waves() -> Scene:
 
 
 def _ending() -> Scene:
-    """Return the scene of two loads that decrease to zero: one body slides on, the other starts to slide."""
+    """Return the test case of two loads that decrease to zero: one body slides on, the other starts to slide."""
     return named(
         "load-that-ends",
         (0.0, 3.0),
@@ -90,7 +90,7 @@ def _ending() -> Scene:
 
 
 def _series() -> Scene:
-    """Return the scene of two blocks in series that move together from t = 2 to 5."""
+    """Return the test case of two blocks in series that move together from t = 2 to 5."""
     tau = 3.0
     x = 0.125 * (tau + 1.0 - math.cos(tau) - math.sin(tau))
     v = 0.125 * (1.0 + math.sin(tau) - math.cos(tau))
@@ -105,7 +105,7 @@ def _series() -> Scene:
 
 
 def _painleve() -> Scene:
-    """Return the scene of two admissible motions; the message of the run must name both motions."""
+    """Return the test case of two admissible motions; the message of the run must name both motions."""
     return Scene(
         "painleve-start",
         "painleve",
@@ -122,7 +122,7 @@ def _painleve() -> Scene:
 
 
 def _stop_off_zero() -> Scene:
-    """Return the scene of a gap that opens at t = pi/6 with zero force, and grows as the cube of time."""
+    """Return the test case of a gap that opens at t = pi/6 with zero force, and grows as the cube of time."""
     began, end = math.pi / 6, 3.0
     left = end - began
     v = math.cos(began) - math.cos(end) - 0.5 * left
@@ -137,7 +137,7 @@ def _stop_off_zero() -> Scene:
 
 
 def _moving_floor() -> Scene:
-    """Return the scene of a body that leaves the floor when the floor's acceleration reaches gravity."""
+    """Return the test case of a body that leaves the floor when the floor's acceleration reaches gravity."""
     g, size, turns, end = 9.81, 0.02, 30.0, 0.25
     phase = math.asin(g / (size * turns**2))
     first, again = phase / turns, (phase + 2 * math.pi) / turns
@@ -163,7 +163,7 @@ def _moving_floor() -> Scene:
 
 
 def _kinked_floors() -> Scene:
-    """Return the scene of two floors whose speeds jump at t = 0.1, one upward and one downward."""
+    """Return the test case of two floors whose speeds jump at t = 0.1, one upward and one downward."""
     began, end = 0.1, 0.14
 
     def state(t: float) -> tuple[float, ...]:
@@ -183,7 +183,7 @@ def _kinked_floors() -> Scene:
 
 
 def _own_speed() -> Scene:
-    """Return the scene of v' = 0.48 min(-v, 0.85) - 2, whose solution is exponential, then linear."""
+    """Return the test case of v' = 0.48 min(-v, 0.85) - 2, whose solution is exponential, then linear."""
     limit = 2.0 / 0.48
     reached = math.log((limit - 0.2) / (limit - 0.85)) / 0.48
 
@@ -202,7 +202,7 @@ def _own_speed() -> Scene:
 
 
 def _element() -> Scene:
-    """Return the scene of a spring with a slider, in which the force limit of the slider varies."""
+    """Return the test case of a spring with a slider, in which the force limit of the slider varies."""
     stiffness, mu, end = 20.0, 0.5, 7.0
 
     def place(t: float) -> float:

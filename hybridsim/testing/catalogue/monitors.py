@@ -10,12 +10,12 @@ from hybridsim.testing.scene import END, Scene, Truth, needs
 
 
 def scenes() -> tuple[Scene, ...]:
-    """Return all scenes of monitors."""
+    """Return all test cases of monitors."""
     return _stops(), _bounces(), _table(), _corner(), _rope()
 
 
 def _stops() -> Scene:
-    """Return the scene of monitors on the speeds of two bodies, which decrease to zero and stay zero."""
+    """Return the test case of monitors on the speeds of two bodies, which decrease to zero and stay zero."""
     first = ((1.0, "f:stick"), (1.0, "stopped"), (1.0, "counted"))
     return Scene(
         "monitors-at-stops",
@@ -34,7 +34,7 @@ def _stops() -> Scene:
 
 
 def _bounces() -> Scene:
-    """Return the scene of monitors on a ball that first hits the floor at t = 1 and rests at t = 3."""
+    """Return the test case of monitors on a ball that first hits the floor at t = 1 and rests at t = 3."""
     return Scene(
         "monitors-at-bounces",
         "bounces-watched",
@@ -59,7 +59,7 @@ def _fires_at_rest(solution: Any) -> list[str]:
 
 
 def _table() -> Scene:
-    """Return the scene of monitors on a table that falls to zero and rises again."""
+    """Return the test case of monitors on a table that falls to zero and rises again."""
     return Scene(
         "monitors-of-a-turning-table",
         "turning-table",
@@ -70,7 +70,7 @@ def _table() -> Scene:
 
 
 def _corner() -> Scene:
-    """Return the scene of a body in the corner of a box, which hits two walls at t = 1, 3 and 5."""
+    """Return the test case of a body in the corner of a box, which hits two walls at t = 1, 3 and 5."""
     return Scene(
         "corners-of-a-box",
         "box-corner",
@@ -86,7 +86,7 @@ def _corner() -> Scene:
 
 
 def _rope() -> Scene:
-    """Return the scene of a rope that slides off a table, with solution b/a + (1/2 - b/a) cosh(sqrt(a) t)."""
+    """Return the test case of a rope that slides off a table, with solution b/a + (1/2 - b/a) cosh(sqrt(a) t)."""
     a, b = 9.81 * 1.3 / 2.0, 9.81 * 0.3
     rest = b / a
     end = math.acosh((2.0 - rest) / (0.5 - rest)) / math.sqrt(a)

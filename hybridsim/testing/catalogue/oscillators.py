@@ -42,7 +42,7 @@ def states(
 
 
 def oscillator(case: str, **changes: Any) -> Scene:
-    """Return the scene of a case with a closed form, which gives all events and samples of the states."""
+    """Return a test case with a closed form, which gives all events and samples of the states."""
     fact = CASES[case]
     p = {name: float(fact["params"][name]) for name in NAMES}
     x0, v0 = fact["x0"]
@@ -76,7 +76,7 @@ def oscillator(case: str, **changes: Any) -> Scene:
 
 
 def den_hartog(case: str) -> Scene:
-    """Return the scene of a periodic orbit without stops over ten periods, which ends at a turning point."""
+    """Return the test case of a periodic orbit without stops over ten periods, which ends at a turning point."""
     t0, t1 = CASES[case]["t_span"]
     return oscillator(
         case,
@@ -89,7 +89,7 @@ def den_hartog(case: str) -> Scene:
 
 
 def steady(case: str) -> Scene:
-    """Return the scene of a long transient to a steady motion without stops, with known amplitude."""
+    """Return the test case of a long transient to a steady motion without stops, with known amplitude."""
     fact = CASES[case]
     end, period = fact["t_span"][1], 2 * math.pi / fact["params"]["w"]
     last = (amplitude("x", end - period, end), fact["expected"]["amplitude_last_cycle"])
@@ -100,7 +100,7 @@ def steady(case: str) -> Scene:
 
 
 def dfcs(name: str, F0: float, ratio: float) -> Scene:
-    """Return the scene of the packaged model `dfcs` over a hundred periods from rest."""
+    """Return the test case of the packaged model `dfcs` over a hundred periods from rest."""
     model = hs.load("dfcs").with_(F0=F0, omega=f"{ratio}*sqrt(k/m)")
     p = model.parameter_values()
     limit = p["mu"] * p["N"]
@@ -125,7 +125,7 @@ def dfcs(name: str, F0: float, ratio: float) -> Scene:
 
 
 def backward_orbit() -> Scene:
-    """Return the scene of a Den Hartog orbit that runs backward in time through a turning point."""
+    """Return the test case of a Den Hartog orbit that runs backward in time through a turning point."""
     case = "DH-r2-f0.2"
     fact = CASES[case]
     p = {name: float(fact["params"][name]) for name in NAMES}
@@ -147,7 +147,7 @@ def backward_orbit() -> Scene:
 
 
 def backward_stick() -> Scene:
-    """Return the scene of a body at rest that runs backward in time, where the past is not unique."""
+    """Return the test case of a body at rest that runs backward in time, where the past is not unique."""
     return oscillator(
         "FLAG-flag_a",
         name="backward-stick",
@@ -159,7 +159,7 @@ def backward_stick() -> Scene:
 
 
 def threshold() -> Scene:
-    """Return the scene of a force that reaches the stick limit and decreases again without any motion."""
+    """Return the test case of a force that reaches the stick limit and decreases again without any motion."""
     end = CASES["THR-exact"]["t_span"][1]
     truth = Truth(
         (), tuple((t, (0.0, 0.0)) for t in (1.0, math.pi, 7.0, end)), checks=(("", no_transition), *STUCK)
@@ -168,7 +168,7 @@ def threshold() -> Scene:
 
 
 def scenes() -> tuple[Scene, ...]:
-    """Return all scenes of the dry friction oscillator."""
+    """Return all test cases of the dry friction oscillator."""
     return (
         *(oscillator(f"FLAG-flag_{which}") for which in ("a", "b_mus", "d_nodamp")),
         *(den_hartog(f"DH-{which}") for which in ("r2-f0.2", "r0.75-f0.3", "r1.5-f0.5")),

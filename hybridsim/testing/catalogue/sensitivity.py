@@ -16,12 +16,12 @@ GRAZING_START = (GRAZING_FORCE * (1 - _OMEGA**2) / _D, _DAMPING * _OMEGA**2 * GR
 
 
 def scenes() -> tuple[Scene, ...]:
-    """Return all scenes that amplify small errors."""
+    """Return all test cases that amplify small errors."""
     return lifting(), grazing_stop()
 
 
 def grazing_stop() -> Scene:
-    """Return the scene of a vibration that hits a rigid stop at low speed, which amplifies errors."""
+    """Return the test case of a vibration that hits a rigid stop at low speed, which amplifies errors."""
     events, states = recomputed("grazing-stop")
     return Scene(
         "grazing-stop",
@@ -40,7 +40,7 @@ def grazing_stop() -> Scene:
 
 
 def lifting() -> Scene:
-    """Return the scene of a contact that opens in chaotic motion, which amplifies errors of a fixed step."""
+    """Return the test case of a contact that opens in chaotic motion, which amplifies errors of a fixed step."""
     expected = CASES["FEENY"]["expected"]
 
     def turns(solution: Any) -> list[float]:

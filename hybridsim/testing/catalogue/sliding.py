@@ -18,7 +18,7 @@ SLIDING = "sliding"
 
 
 def scenes() -> tuple[Scene, ...]:
-    """Return all scenes of switching surfaces."""
+    """Return all test cases of switching surfaces."""
     return (
         *_published(),
         _circle(),
@@ -53,7 +53,7 @@ def stays(component: str, *terms: str, to_one: bool = False) -> Check:
 
 
 def _published() -> tuple[Scene, ...]:
-    """Return scenes published with other tools, and scenes of the same systems declared with modes."""
+    """Return test cases published with other tools, and the same systems declared with modes."""
     exact: dict[str, Any] = {"tol_t": 1e-9, "tol_x": 1e-9}
     at_rest = (("", equals(1.0, x1=0.0, x2=0.0)),)
     passages = CASES["SIC-filippov"]["expected"]["first_crossings"]
@@ -135,7 +135,7 @@ def spirals_in(solution: Any) -> list[str]:
 
 
 def _along_the_circle() -> Scene:
-    """Return the scene of a motion that slides along a circle until the end of the run, t = 3.5."""
+    """Return the test case of a motion that slides along a circle until the end of the run, t = 3.5."""
     scene = _circle()
     events = (scene.truth.events or ())[:1]
     truth = replace(scene.truth, events=events, states=scene.truth.states[:2])
@@ -143,7 +143,7 @@ def _along_the_circle() -> Scene:
 
 
 def _circle() -> Scene:
-    """Return the scene of a motion that spirals to the circle r = 1, slides along it and leaves it."""
+    """Return the test case of a motion that spirals to the circle r = 1, slides along it and leaves it."""
     onto, off = 4 - math.sqrt(16 - 8 * math.log(2)), 4.0
 
     def at(t: float, log_r: float) -> tuple[float, tuple[float, float]]:
@@ -161,7 +161,7 @@ def _circle() -> Scene:
 
 
 def _decay() -> Scene:
-    """Return the scene of v = -t until x + v = 0 at t = sqrt(3) - 1, after which x decays as exp(-t)."""
+    """Return the test case of v = -t until x + v = 0 at t = sqrt(3) - 1, after which x decays as exp(-t)."""
     onto = math.sqrt(3) - 1
     states = [(0.5, (0.875, -0.5))]
     states += [(t, (onto * math.exp(onto - t), -onto * math.exp(onto - t))) for t in (1.0, 2.0, 5.0)]
@@ -175,7 +175,7 @@ def _decay() -> Scene:
 
 
 def _rubbing_servo() -> Scene:
-    """Return the scene of a servo with friction, which slides along x - 1 + v = 0 with decay exp(-t)."""
+    """Return the test case of a servo with friction, which slides along x - 1 + v = 0 with decay exp(-t)."""
 
     def speed(t: float) -> float:
         return 1.7 * t + (1.0 - math.cos(3.0 * t)) / 6.0
@@ -197,7 +197,7 @@ def _rubbing_servo() -> Scene:
 
 
 def _two_relays() -> Scene:
-    """Return the scene of two relays: the motion slides along x = y = 0, and leaves x = 0 at t = 3/2."""
+    """Return the test case of two relays: the motion slides along x = y = 0, and leaves x = 0 at t = 3/2."""
     first, both, off = 1 / 6, 1.5 - math.sqrt(0.75), 1.5
 
     def x(t: float) -> float:
@@ -218,7 +218,7 @@ def _two_relays() -> Scene:
 
 
 def _chatter() -> Scene:
-    """Return the scene of a thermostat whose state changes between rising and falling within +-1e-3."""
+    """Return the test case of a thermostat whose state changes between rising and falling within +-1e-3."""
     band, end = 1e-3, 0.3
     events, t, up = [], band, True
     while t < end:
@@ -238,7 +238,7 @@ def _chatter() -> Scene:
 
 
 def _refused() -> tuple[Scene, ...]:
-    """Return scenes with several admissible motions, in which the run must stop and name the surfaces."""
+    """Return test cases with several admissible motions, in which the run must stop and name the surfaces."""
     return (
         Scene(
             "ambiguous-meeting",

@@ -8,12 +8,12 @@ from hybridsim.testing.scene import Scene, Truth, named, needs
 
 
 def scenes() -> tuple[Scene, ...]:
-    """Return all scenes in which long steps are unstable."""
+    """Return all test cases in which long steps are unstable."""
     return _walls(), _follower(), _long_swing()
 
 
 def _walls() -> Scene:
-    """Return the scene of two stiff walls: flights take 2 time units at speed 1, and contacts take pi/sqrt(k)."""
+    """Return the test case of two stiff walls: flights take 2 time units at speed 1, and contacts take pi/sqrt(k)."""
     contact = math.pi / 1e3
     events, t = [], 1.0
     for n in range(5):
@@ -36,7 +36,7 @@ def _walls() -> Scene:
 
 
 def _follower() -> Scene:
-    """Return the scene of a fast filter with the solution x = sin(t) for every value of its rate."""
+    """Return the test case of a fast filter with the solution x = sin(t) for every value of its rate."""
     return Scene(
         "step-limit",
         "follower",
@@ -49,7 +49,7 @@ def _follower() -> Scene:
 
 
 def _long_swing() -> Scene:
-    """Return the scene of a swing with the solution cos(t) over two thousand periods."""
+    """Return the test case of a swing with the solution cos(t) over two thousand periods."""
     end = 2000 * 2 * math.pi
     times = (end / 2 + 0.5, end - 1.0, end)
     return Scene(

@@ -17,12 +17,12 @@ _SUMS = (
 
 
 def scenes() -> tuple[Scene, ...]:
-    """Return scenes with guards, contacts, a relay and a gap next to corners, and zeros at the start."""
+    """Return test cases with guards, contacts, a relay and a gap next to corners, and zeros at the start."""
     return _guards(), _contacts(), _relay(), _gap(), _sampled(), _order(), _flat(), _zeros(), _held()
 
 
 def _guards() -> Scene:
-    """Return the scene of guards with corners; all states move at constant rates."""
+    """Return the test case of guards with corners; all states move at constant rates."""
     events = (
         (0.5, "nested:after"),
         (1.0, "largest:after"),
@@ -41,7 +41,7 @@ def _guards() -> Scene:
 
 
 def _contacts() -> Scene:
-    """Return the scene of five contacts: three bodies rest, one starts at t = 2, and one slides freely."""
+    """Return the test case of five contacts: three bodies rest, one starts at t = 2, and one slides freely."""
     events = ((0.0, "lifted_N:open"), (2.0, "step:slip+"))
     states = (
         (1.0, (-1.0, 0.0, -2.0, 0.0, 0.0, 0.0, -1.0, 0.5)),
@@ -62,7 +62,7 @@ def _relay() -> Scene:
 
 
 def _gap() -> Scene:
-    """Return the scene of a ball that a force with a corner lifts at y = 1/3."""
+    """Return the test case of a ball that a force with a corner lifts at y = 1/3."""
     lifted = 0.5 + 2.0 + 1.0 / 3.0
     rise = 4.0 - lifted
     states = ((0.25, (0.0, 0.0, -0.75)), (2.5, (0.0, 0.0, 0.0)), (4.0, (0.5 * rise**3, 1.5 * rise**2, 1.5)))
@@ -72,7 +72,7 @@ def _gap() -> Scene:
 
 
 def _sampled() -> Scene:
-    """Return the scene of a clock that ticks at the start, before the contacts have modes."""
+    """Return the test case of a clock that ticks at the start, before the contacts have modes."""
     read = tuple(
         (partial(_read, name, t), value)
         for t, values in (
@@ -105,7 +105,7 @@ def _order() -> Scene:
 
 
 def _flat() -> Scene:
-    """Return the scene of a corner with zero slope on both sides; the solution is c = 9 + cos(t)."""
+    """Return the test case of a corner with zero slope on both sides; the solution is c = 9 + cos(t)."""
     return named(
         "flat-corner",
         (0.0, 2.0),
@@ -117,7 +117,7 @@ def _flat() -> Scene:
 
 
 def _zeros() -> Scene:
-    """Return the scene whose states start at zeros of their guards and change at rate one."""
+    """Return the test case whose states start at zeros of their guards and change at rate one."""
     starts = tuple(a + b for a, b in _SUMS)
     return named(
         "starts-at-zeros",
@@ -128,7 +128,7 @@ def _zeros() -> Scene:
 
 
 def _held() -> Scene:
-    """Return the scene of three bodies that start at the speeds of their belts and stay in stick."""
+    """Return the test case of three bodies that start at the speeds of their belts and stay in stick."""
     starts = {f"v{k}": a + b for k, (a, b) in enumerate(_SUMS[:3])}
     return named(
         "starts-at-belt-speeds",

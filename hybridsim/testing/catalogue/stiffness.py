@@ -12,7 +12,7 @@ from hybridsim.testing.scene import Scene, Truth, needs
 
 
 def scenes() -> tuple[Scene, ...]:
-    """Return scenes without events; one of them is stiff."""
+    """Return test cases without events; one of them is stiff."""
     stiff = CASES["TANH"]["expected"]["eps_1e_6"]
     return (
         Scene("FMI-vdp", "vdp", (0.0, 20.0), Truth((), recomputed("FMI-vdp")[1]), unit=6.66, speed=3.0),
@@ -44,7 +44,7 @@ def scenes() -> tuple[Scene, ...]:
 
 
 def _neuron() -> Scene:
-    """Return the scene of a neuron, whose interval between spikes is the integral of dV/V'."""
+    """Return the test case of a neuron, whose interval between spikes is the integral of dV/V'."""
 
     def time_per_volt(V: float) -> float:
         return 281.0 / (30.0 * 2.0 * math.exp((V + 50.4) / 2.0) + 1000.0 - 30.0 * (V + 70.6))
@@ -64,7 +64,7 @@ def _neuron() -> Scene:
 
 
 def _decades() -> Scene:
-    """Return the scene of two decays whose half-lives ln(2)/1e8 and ln(2) differ by eight decades."""
+    """Return the test case of two decays whose half-lives ln(2)/1e8 and ln(2) differ by eight decades."""
     early, late = math.log(2) * 1e-8, math.log(2)
     states = (
         (early, (math.exp(-early), 0.5)),

@@ -20,7 +20,7 @@ LAST = 6.0
 
 
 def scenes() -> tuple[Scene, ...]:
-    """Return all scenes of stops."""
+    """Return all test cases of stops."""
     return (_stop(),)
 
 

@@ -9,12 +9,12 @@ from hybridsim.testing.scene import Scene, Truth, named, needs
 
 
 def scenes() -> tuple[Scene, ...]:
-    """Return scenes of guards that depend on speeds and gaps."""
+    """Return test cases of guards that depend on speeds and gaps."""
     return _speeds(), _gaps()
 
 
 def _speeds() -> Scene:
-    """Return the scene of three bodies with guards on their speeds, which fire at stops."""
+    """Return the test case of three bodies with guards on their speeds, which fire at stops."""
     back = math.sqrt(5.4) - 2.0  # after its kick the third body moves by -0.7 + 2 s + s**2/2
     turn = 0.8 + 1 / 3
     events = (
@@ -42,7 +42,7 @@ def _speeds() -> Scene:
 
 
 def _gaps() -> Scene:
-    """Return the scene of guards on two gaps with piecewise polynomial motion."""
+    """Return the test case of guards on two gaps with piecewise polynomial motion."""
     rest = math.sqrt(2.0)
     states = (
         (0.5, (0.75, -1.0, 1.75, -1.0, 0.0)),

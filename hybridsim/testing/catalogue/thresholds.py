@@ -15,12 +15,12 @@ STICK = needs("contacts", "exact-stick")
 
 
 def scenes() -> tuple[Scene, ...]:
-    """Return all scenes near the stick limit."""
+    """Return all test cases near the stick limit."""
     return _micro_slip(), _fading(), _many_stops(), _between(), _half(), _small(), _at_rest()
 
 
 def _swing(name: str, periods: float, **changes: Any) -> Scene:
-    """Return the scene of an oscillator that starts from rest, with its closed form over some forcing periods."""
+    """Return the test case of an oscillator that starts from rest, with its closed form over some forcing periods."""
     p = {"m": 1.0, "c": 0.0, "k": 1.0, "Fs": 0.3, "Fk": 0.3, "F0": 1.0, "w": 1.0, **changes}
     unit = 2 * math.pi / p["w"]
     span = (0.0, periods * unit)
@@ -40,7 +40,7 @@ def _swing(name: str, periods: float, **changes: Any) -> Scene:
 
 
 def _micro_slip() -> Scene:
-    """Return the scene of a force that exceeds the stick limit by 1e-4, so that the body slips by 1e-7."""
+    """Return the test case of a force that exceeds the stick limit by 1e-4, so that the body slips by 1e-7."""
     found, samples = recomputed("micro-slip")
     return Scene(
         "micro-slip",
@@ -59,7 +59,7 @@ def _micro_slip() -> Scene:
 
 
 def _fading() -> Scene:
-    """Return the scene of a stick limit that decreases to the force at t = 5, where slip begins."""
+    """Return the test case of a stick limit that decreases to the force at t = 5, where slip begins."""
     samples = tuple((t, ((t - 5) ** 3 / 30, (t - 5) ** 2 / 10)) for t in (5.5, 7.0, 9.0))
     checks = (("exact-stick", exact_stick("f", {"v": 0.0}, rest=("x",))),)
     return named(
@@ -74,13 +74,13 @@ def _fading() -> Scene:
 
 
 def _many_stops() -> Scene:
-    """Return the scene of a body that is pulled slowly and stops many times in each period."""
+    """Return the test case of a body that is pulled slowly and stops many times in each period."""
     swing = _swing("many-stops", 1, w=0.05, c=0.1, Fs=0.1, Fk=0.05)
     return replace(swing, needs=STICK | {"multiple-roots"})  # a slip is short compared with the period
 
 
 def _between() -> Scene:
-    """Return the scene of a pulled slider that stops where the spring force is between slip and stick force.
+    """Return the test case of a pulled slider that stops where the spring force is between slip and stick force.
 
     In a slip e = 0.2 + 0.8 cos(s) + 0.5 sin(s), and it ends at tan(s/2) = -0.8/0.5, where e = 0.2 - 0.8.
     """
@@ -109,18 +109,18 @@ def _between() -> Scene:
 
 
 def _half() -> Scene:
-    """Return the scene of an undamped oscillator that is driven at half its natural frequency."""
+    """Return the test case of an undamped oscillator that is driven at half its natural frequency."""
     swing = _swing("half-frequency", 10, w=0.5)
     return replace(swing, floor=1e-9)  # undamped, so the errors of ten periods add up
 
 
 def _small() -> Scene:
-    """Return the scene of an oscillator with forces scaled by 1/1000, and therefore small speeds."""
+    """Return the test case of an oscillator with forces scaled by 1/1000, and therefore small speeds."""
     return _swing("small-speeds", 10, F0=1e-3, Fs=3e-4, Fk=3e-4, w=0.75, c=0.1)
 
 
 def _at_rest() -> Scene:
-    """Return the scene of a spring that pulls with half of the stick limit, so that nothing moves."""
+    """Return the test case of a spring that pulls with half of the stick limit, so that nothing moves."""
     samples = tuple((t, (0.5, 0.0)) for t in (1.0, 30.0, 100.0))
     return Scene(
         "resting-load",

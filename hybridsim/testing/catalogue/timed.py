@@ -11,12 +11,12 @@ from hybridsim.testing.scene import Scene, Truth, needs
 
 
 def scenes() -> tuple[Scene, ...]:
-    """Return all scenes of events at known times and of runs backward in time."""
+    """Return all test cases of events at known times and of runs backward in time."""
     return *scheduled(), *backward()
 
 
 def scheduled() -> tuple[Scene, ...]:
-    """Return scenes of events at known times."""
+    """Return test cases of events at known times."""
     stair = CASES["FMI-stair"]["expected"]
     ticks = tuple((float(k), "tick") for k in range(1, 10)) + ((9.0, "full"),)
     counts = tuple(("", equals(float(t), counter=float(n))) for t, n in stair["counter_at"].items())
@@ -61,7 +61,7 @@ def scheduled() -> tuple[Scene, ...]:
 
 
 def backward() -> tuple[Scene, ...]:
-    """Return scenes that run backward in time inside a mode."""
+    """Return test cases that run backward in time inside a mode."""
     t = CASES["DEQ-rev"]["expected"]["t_event"]
     zeros = tuple(((n + 0.5) * math.pi, "zero") for n in reversed(range(6)))
     samples = tuple((s, (math.cos(s), -math.sin(s))) for s in (15.0, 7.0, 0.0))

@@ -1,4 +1,4 @@
-"""Title, cause and description of the packaged scenes, in one TOML file for each class of trouble."""
+"""Title, cause and description of the packaged test cases, in one TOML file for each class of trouble."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ HERE = Path(__file__).parent
 
 
 def read() -> dict[str, dict[str, Any]]:
-    """Read the TOML files, and return the class, the title, the cause and the description of each scene."""
+    """Read the TOML files, and return the class, the title, the cause and the description of each test case."""
     found: dict[str, dict[str, Any]] = {}
     for trouble in TROUBLES:
         for name, fields in tomllib.loads((HERE / f"{trouble}.toml").read_text("utf-8")).items():
@@ -24,7 +24,7 @@ def read() -> dict[str, dict[str, Any]]:
 
 
 def with_stories(scenes: tuple[Scene, ...]) -> tuple[Scene, ...]:
-    """Return the scenes with their titles, causes and descriptions, in the order of the classes."""
+    """Return the test cases with their titles, causes and descriptions, in the order of the classes."""
     stories = read()
     known = [replace(scene, **stories[scene.name]) if scene.name in stories else scene for scene in scenes]
     return tuple(sorted(known, key=lambda scene: list(TROUBLES).index(scene.trouble or "events")))
