@@ -7,12 +7,12 @@ from collections.abc import Sequence
 from typing import Any
 
 from hybridsim.testing.checks import at_times, equals
-from hybridsim.testing.scene import END, Check, Scene, Truth, needs
+from hybridsim.testing.scene import END, Check, Scene, Truth, named, needs
 
 
 def scenes() -> tuple[Scene, ...]:
     """Return all test cases of elements that are declared in one line, and of guards with a direction."""
-    return _directions(), _elements(), _delays()
+    return _directions(), _elements(), _delays(), _wrapped()
 
 
 def _transitions(component: str, expected: Sequence[tuple[float, str]], within: float = 1e-3) -> Check:
@@ -98,4 +98,36 @@ def _delays() -> Scene:
         needs("scheduled"),
         unit=2 * math.pi,
         tol_x=1e-7,
+    )
+
+
+def _wrapped() -> Scene:
+    """Return the test case of angle = 8 t - t**2/2, which passes 2 pi k at t = 8 -+ sqrt(64 - 4 pi k), k = 1 to 5.
+
+    The level 1/4 + t/32 equals mod(t, 1) at t = 32 (k + 1/4)/31, and is passed by the jump of mod(t, 1) at each tick.
+    """
+    end = 15.5
+    half = [math.sqrt(64.0 - 4.0 * math.pi * k) for k in range(1, 6)]
+    turns = [8.0 - h for h in half] + [8.0 + h for h in half]
+    off = [32.0 * (k + 0.25) / 31.0 for k in range(15)]
+    events = [(t, "turns:on") for t in turns] + [(t, "switch:off") for t in off]
+    events += [(float(k), "switch:on") for k in range(1, 16)]
+
+    def state(t: float) -> tuple[float, ...]:
+        beyond = math.fsum(max(min(t, 8.0 + h) - (8.0 - h), 0.0) for h in half)
+        whole = math.floor(t)
+        return (
+            8.0 * t - t**2 / 2,
+            8.0 - t,
+            4.0 * t**2 - t**3 / 6 - 2.0 * math.pi * beyond,
+            whole / 2 + (t - whole) ** 2 / 2,
+            math.fsum(min(t, until) - k for k, until in enumerate(off) if k < t) + max(t - 15.0, 0.0),
+        )
+
+    return named(
+        "wrapped-angle",
+        (0.0, end),
+        Truth(tuple(sorted(events)), tuple((t, state(t)) for t in (3.1, 8.2, 12.3, end))),
+        needs("transitions"),
+        speed=8.0,
     )

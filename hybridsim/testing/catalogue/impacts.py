@@ -1,8 +1,9 @@
-"""Scenes of impacts with restitution: infinitely many bounces, double impacts, a vibrating table."""
+"""Scenes of impacts with restitution: infinitely many bounces, double impacts, a vibrating table, a row of balls."""
 
 from __future__ import annotations
 
 import math
+from fractions import Fraction
 from typing import Any
 
 from hybridsim.testing.checks import at_times, equals
@@ -16,7 +17,7 @@ REST = FALL * (1 + E) / (1 - E)
 
 def scenes() -> tuple[Scene, ...]:
     """Return all test cases of impacts with restitution."""
-    return _bounce(), _bar(), _table()
+    return _bounce(), _bar(), _table(), _walls()
 
 
 def _height(t: float) -> tuple[float, float]:
@@ -113,3 +114,59 @@ def _table() -> Scene:
         speed=0.4,
         tol_x=1e-8,
     )
+
+
+def _walls() -> Scene:
+    """Return the test case of balls of masses 1 and 3 between walls, whose motion is a sequence of rational numbers."""
+    end = 12
+    hits, motion = _impacts_of_row(end)
+    sampled = (Fraction(1, 2), Fraction(2), Fraction(5), Fraction(9), Fraction(end))
+    return named(
+        "balls-between-walls",
+        (0.0, float(end)),
+        Truth(
+            tuple((float(t), f"{name}:open") for t, name in hits),
+            tuple((float(t), _state_of_row(motion, t)) for t in sampled),
+        ),
+        needs("impacts", "located"),
+        tol_t=1e-9,
+        tol_x=1e-9,
+    )
+
+
+# a time, and the positions and velocities just after it
+Row = tuple[Fraction, list[Fraction], list[Fraction]]
+
+
+def _impacts_of_row(end: int) -> tuple[list[tuple[Fraction, str]], list[Row]]:
+    """Return the times and names of the impacts of the two balls, and the motion after each of them, as fractions.
+
+    Between impacts the velocities are constant. An impact at a wall multiplies the velocity by -e. An impact of the
+    balls keeps their momentum and multiplies the velocity of approach by -e.
+    """
+    e, m1, m2 = Fraction(3, 4), 1, 3
+    now, x, v = Fraction(0), [Fraction(1, 4), Fraction(5, 8)], [Fraction(1), Fraction(-1, 2)]
+    hits: list[tuple[Fraction, str]] = []
+    motion = [(now, x, v)]
+    while True:
+        gaps = {"left": (x[0], v[0]), "middle": (x[1] - x[0], v[1] - v[0]), "right": (1 - x[1], -v[1])}
+        time, name = min((now - gap / rate, name) for name, (gap, rate) in gaps.items() if rate < 0)
+        if time > end:
+            return hits, motion
+        x = [place + speed * (time - now) for place, speed in zip(x, v, strict=True)]
+        if name == "left":
+            v = [-e * v[0], v[1]]
+        elif name == "right":
+            v = [v[0], -e * v[1]]
+        else:
+            mean, apart = (m1 * v[0] + m2 * v[1]) / (m1 + m2), e * (v[0] - v[1]) / (m1 + m2)
+            v = [mean - m2 * apart, mean + m1 * apart]
+        now = time
+        hits.append((now, name))
+        motion.append((now, x, v))
+
+
+def _state_of_row(motion: list[Row], t: Fraction) -> tuple[float, ...]:
+    """Return x1, v1, x2 and v2 at a time."""
+    since, x, v = [row for row in motion if row[0] <= t][-1]
+    return tuple(float(value) for k in range(2) for value in (x[k] + v[k] * (t - since), v[k]))
