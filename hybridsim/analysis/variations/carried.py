@@ -30,6 +30,8 @@ from hybridsim.analysis.variations.off_zero import (
     off_zero,
     rates_of,
 )
+from hybridsim.analysis.variations.ordinary import NotOrdinary, Passage, are_of_the_model, guards_between
+from hybridsim.analysis.variations.ordinary_kernel import Passages, carry_ordinary
 from hybridsim.analysis.variations.rounds import (
     Rounds,
     batches,
@@ -47,12 +49,15 @@ from hybridsim.analysis.variations.segment_events import (
 from hybridsim.analysis.variations.sizes import sizes
 from hybridsim.analysis.variations.values.table_slopes import TableValue
 from hybridsim.analysis.variations.values.vector_slopes import VectorSlopes
+from hybridsim.engine.native.kernels import Precompiled
+from hybridsim.engine.native.struct_pack import packed
 from hybridsim.engine.record.segments import Segment
 from hybridsim.engine.system.system import System
 from hybridsim.errors import UsageError
 from hybridsim.solution import Solution
 
 _ROUNDING = 1e-11  # of a run's length, for a change of its own size: a time that moves by less does not move
+_carry_ordinary = Precompiled(carry_ordinary)
 _SAME = 1e-9  # of its size: a state that changes by less at an event does not jump
 
 
@@ -88,12 +93,15 @@ class Carrier:
         times: list[tuple[float, np.ndarray]] = []
         starts: list[tuple[np.ndarray, np.ndarray]] = []
         shifts = [np.zeros(G.shape[1])]
+        Y, Yd = self._started(self.solution._segments[0], Y, Yd, G, event_times)
+        self._flow.prepare(Yd, G)
+        found = None if sided else self._ordinary(Y, Yd, G)
+        if found is not None:
+            return found
         all_segment_events = list(segment_events_of(self.solution))
         if any(not is_recorded(self.system, one) for one in all_segment_events[-1].happened):
             whole = all_segment_events[-1].segment  # at the end, and left the states and modes as they were
             all_segment_events.append(SegmentEvents(replace(whole, s=whole.s[-1:], x=whole.x[-1:]), (), ()))
-        Y, Yd = self._started(all_segment_events[0].segment, Y, Yd, G, event_times)
-        self._flow.prepare(Yd, G)
         for number, (segment_events, following) in enumerate(
             zip(all_segment_events, [*all_segment_events[1:], None], strict=True)
         ):
@@ -118,6 +126,31 @@ class Carrier:
             Y, Yd = self._at_end(last, all_segment_events[-1].segment, Y, Yd)
             starts[-1] = Y, Yd
         return Carried(Y, Yd, times, self._off, self._lost, starts, shifts)
+
+    def _ordinary(self, Y: np.ndarray, Yd: np.ndarray, G: np.ndarray) -> Carried | None:
+        """Carry derivatives from the start of the run to its end, or return None if an event is not ordinary."""
+        regular = self._flow.regular()
+        if regular is None or not self._vector.is_fixed:
+            return None
+        pieces, moving = regular
+        try:
+            guards = guards_between(self.solution, self._rounding)
+            passage = Passage(self.solution, self._vector, moving)
+            delays, jumps = passage.at_events(guards)
+            holds, at_start, at_end = passage.held()
+        except NotOrdinary:
+            return None
+        first = np.searchsorted(pieces.number, np.arange(len(guards) + 1))
+        starts, shifts = np.empty((len(guards), *Y.shape)), np.zeros((len(guards), Y.shape[1]))
+        starts[0], end = Y, np.empty(Y.shape)
+        passages = packed(Passages(first, pieces.matrices, delays, jumps, holds, at_start, at_end))
+        _carry_ordinary(passages, np.concatenate([Yd, G])[moving], starts, shifts, end, np.empty(Y.shape))
+        segments = self.solution._segments
+        begins = segments.origins().sum(axis=1) + segments.spans()[:, 0]
+        shown = np.flatnonzero(are_of_the_model(self.system, guards)) + 1
+        times = [(float(begins[i]), shifts[i]) for i in shown]
+        moved = np.where(self._moves(shifts), shifts, 0.0)
+        return Carried(end, Yd, times, self._off, self._lost, [(one, Yd) for one in starts], list(moved))
 
     def between(self, carried: Carried, directions: Directions, number: int, stops: np.ndarray) -> np.ndarray:
         """Return the derivatives (k, n + d, M) of states and discrete states at k local times of one segment."""

@@ -13,9 +13,9 @@ from hybridsim.engine.system.system import System
 
 _ALIKE = 1e-7  # of its terms: a smaller change is zero
 _ROUNDING = 1e-11  # of the effect of a change of everything by its own size: a smaller one is rounding
-_EXACT = 2.0**-46  # of its terms: a smaller value is zero
+EXACT = 2.0**-46  # of its terms: a smaller value is zero
 _ZERO = 1e-9  # of a guard's terms along the run: it is at zero, and so has fired by itself
-_TANGENTIAL = (
+TANGENTIAL = (
     1e-9  # a guard that falls by less than this part of its terms leaves the time of its event undefined
 )
 
@@ -62,7 +62,7 @@ class Changed:
     def along(self, rates: np.ndarray) -> float:
         """Return the rate of the function for given rates of the states, or 0 if its terms cancel each other."""
         terms = np.append(self.row * rates, self.by_time)
-        return float(terms.sum()) if abs(terms.sum()) > _TANGENTIAL * np.abs(terms).sum() else 0.0
+        return float(terms.sum()) if abs(terms.sum()) > TANGENTIAL * np.abs(terms).sum() else 0.0
 
 
 class Changes:
@@ -115,7 +115,7 @@ class Changes:
         passing = (states @ np.abs(flow) + times) * abs(at.origin + at.s)
         exact = states @ np.abs(at.x) + fixed + passing
         values = found.values[0, n:]
-        is_zero, is_near = np.abs(values) <= _EXACT * exact, np.abs(values) <= _ZERO * size
+        is_zero, is_near = np.abs(values) <= EXACT * exact, np.abs(values) <= _ZERO * size
         return [
             Changed(
                 value, by[k], sizes[k], by_states[k], float(by_time[k]), bool(is_zero[k]), bool(is_near[k])

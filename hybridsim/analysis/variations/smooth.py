@@ -19,19 +19,16 @@ from numpy.polynomial import legendre
 from hybridsim.errors import UsageError
 
 _STAGES = 8
-_RESOLVED = (
-    1e-8  # last coefficients of the rates on a piece; the end of the piece is accurate to about their square
-)
-_TAIL = 2
+# last coefficients of the rates on a piece; the error at its end is about the square of the next coefficient
+_RESOLVED = 1e-6
+TAIL = 2
 _NOISE = 1e-5  # below this, a residual that halving does not reduce is rounding
 _STIFF_RESOLVED = 1e-11  # the end of a Radau piece is no more accurate than the last coefficients
 _STIFF_NOISE = 1e-9
 _HALVINGS = 30
-_CANCELS = (
-    1e-5  # times _RESOLVED: a change of the states, relative to their sizes, of a few hundred roundings
-)
+CANCELS = 1e-5  # times _RESOLVED: a change of the states, relative to their sizes, of a few hundred roundings
 
-_RADIANS = 0.25  # of a piece at first: fewer rounds of halving than with longer ones
+_RADIANS = 0.5  # of a piece at first: fewer rounds of halving than with longer ones
 _MAX_PARTS = 2**17  # of a step at first
 
 _FADES = 32  # decays by a factor e per step of the run: explicit methods stay below it, stiff methods do not
@@ -92,6 +89,10 @@ class Steps(NamedTuple):
     ends: np.ndarray
 
 
+Over = Callable[[Steps], tuple[np.ndarray, np.ndarray]]
+"""The type of derivatives (K, n, n + q) over pieces, and a measure (K,) of how well each is resolved."""
+
+
 def divided(slopes: NumberedSlopes, steps: Steps, fastest: float) -> tuple[Steps, set[int]]:
     """Return steps that resolve the eigenvalues and the fastest forcing, and the numbers of the stiff segments.
 
@@ -111,34 +112,41 @@ def divided(slopes: NumberedSlopes, steps: Steps, fastest: float) -> tuple[Steps
             remedy="simulate a shorter time, or choose parameters for which the motion is slower",
         )
     regular = ~stiff[number]
-    number, begins, ends, size = number[regular], begins[regular], ends[regular], size[regular]
-    radians = (ends - begins) * np.maximum(size, fastest)
+    chosen = Steps(number[regular], begins[regular], ends[regular])
+    return in_parts(chosen, size[regular], fastest), set(np.flatnonzero(stiff).tolist())
+
+
+def are_slow(steps: Steps, speeds: np.ndarray) -> bool:
+    """Return whether eigenvalues below a bound (K,) show that no segment is stiff or rotates fast."""
+    turns = np.bincount(steps.number, speeds * (steps.ends - steps.begins))
+    return bool((turns <= _FADES * np.bincount(steps.number) + 2**12).all())
+
+
+def in_parts(steps: Steps, speeds: np.ndarray, fastest: float) -> Steps:
+    """Divide steps so that they resolve eigenvalues of the sizes `speeds` (K,) and the fastest forcing."""
+    number, begins, ends = steps
+    radians = (ends - begins) * np.maximum(speeds, fastest)
+    if (radians <= _RADIANS).all():
+        return steps
     count = np.ceil(radians / _RADIANS).clip(1, _MAX_PARTS).astype(np.int64)
     part = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
     number, first, length = (np.repeat(each, count) for each in (number, begins, (ends - begins) / count))
     is_last = part + 1 == np.repeat(count, count)
     last = np.where(is_last, np.repeat(ends, count), first + (part + 1) * length)
-    return Steps(number, first + part * length, last), set(np.flatnonzero(stiff).tolist())
+    return Steps(number, first + part * length, last)
 
 
-def transitions(slopes: NumberedSlopes, steps: Steps, scale: np.ndarray, constants: np.ndarray) -> Intervals:
-    """Return the derivatives over parts of segments, which are halved until they are resolved.
-
-    scale (n,), constants (q,): sizes of the states and of the constants, all positive.
-    """
+def transitions(over: Over, steps: Steps) -> Intervals:
+    """Return the derivatives over pieces of segments, which are halved until they are resolved."""
     number, begins, ends = steps
     found_parts: list[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]] = []
     before = np.full(len(begins), np.inf)
     for halving in range(_HALVINGS):
-        count = 1 + len(begins) * (_STAGES * len(scale)) ** 2 // _ENTRIES_PER_BATCH
-        parts = np.array_split(np.arange(len(begins)), count)
-        done = [
-            over_intervals(slopes, Steps(number[part], begins[part], ends[part]), scale, constants)
-            for part in parts
-        ]
-        found, tails = (np.concatenate(each) for each in zip(*done, strict=True))
+        found, tails = over(Steps(number, begins, ends))
         is_rounding = (tails <= _NOISE) & (tails >= 0.7 * before)
         good = (tails <= _RESOLVED) | is_rounding | (halving == _HALVINGS - 1)
+        if not halving and good.all():
+            return Intervals(number, begins, ends, found)
         found_parts.append((number[good], begins[good], ends[good], found[good]))
         if good.all():
             break
@@ -188,7 +196,7 @@ def stiff_transitions(
     reached = _Stops(stops, knots[0], Y)
     # in units of the states; the first n columns have the size of the largest, the others each their own
     units = np.concatenate([scale, np.ones(len(constants))]) / scale[:, None]
-    least = np.concatenate([np.ones(n), _CANCELS / constants])
+    least = np.concatenate([np.ones(n), CANCELS / constants])
     waiting = [(begin, end, np.inf) for begin, end in pairwise(knots)][::-1]
     most = 16 * len(waiting) + 2**14
     for _ in range(most):
@@ -198,7 +206,7 @@ def stiff_transitions(
         length, middle = end - begin, 0.5 * (begin + end)
         rates = _rates(RADAU, slopes, np.array([begin]), np.array([length]), Y)[0]
         tails = (
-            length * np.abs(np.einsum("ci,iab->cab", RADAU.coefficients[-_TAIL:], rates)).max(axis=0) * units
+            length * np.abs(np.einsum("ci,iab->cab", RADAU.coefficients[-TAIL:], rates)).max(axis=0) * units
         )
         sizes = (np.abs(Y) * units).max(axis=0)
         sizes[:n] = sizes[:n].max()
@@ -219,7 +227,17 @@ def stiff_transitions(
 def over_intervals(
     slopes: NumberedSlopes, steps: Steps, scale: np.ndarray, constants: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the derivatives over each part, and a measure of how well each part is resolved."""
+    """Return the derivatives over each piece, and a measure of how well each piece is resolved."""
+    most = max(1, _ENTRIES_PER_BATCH // (_STAGES * len(scale)) ** 2)
+    batches = [Steps(*(each[k : k + most] for each in steps)) for k in range(0, len(steps.number), most)]
+    done = [_over_batch(slopes, batch, scale, constants) for batch in batches]
+    found, tails = (np.concatenate(each) for each in zip(*done, strict=True))
+    return found, tails
+
+
+def _over_batch(
+    slopes: NumberedSlopes, steps: Steps, scale: np.ndarray, constants: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     number, begins, ends = steps
     lengths = ends - begins
     at = np.repeat(number, _STAGES)
@@ -227,7 +245,7 @@ def over_intervals(
     moved = lengths[:, None, None] * np.einsum("i,kiab->kab", GAUSS.b, rates)
     n = moved.shape[1]
     moved[:, :, :n] += np.eye(n)
-    tails = np.abs(np.einsum("ci,kiab->kcab", GAUSS.coefficients[-_TAIL:], rates)).max(axis=1)
+    tails = np.abs(np.einsum("ci,kiab->kcab", GAUSS.coefficients[-TAIL:], rates)).max(axis=1)
     tails *= lengths[:, None, None] / scale[:, None]
     sizes = np.abs(moved) / scale[:, None]
     sizes[:, :, :n] *= scale
@@ -235,8 +253,8 @@ def over_intervals(
     # the states by the states as one matrix without units; each of the constants by itself
     resolved = tails[:, :, :n].max(axis=(1, 2)) / sizes[:, :, :n].max(axis=(1, 2))
     others, largest = tails[:, :, n:].max(axis=1), sizes[:, :, n:].max(axis=1)
-    # relative to the effect of a change of a constant by its own size; below _CANCELS only rounding is left
-    relative = others / np.maximum(largest, _CANCELS / constants)
+    # relative to the effect of a change of a constant by its own size; below CANCELS only rounding is left
+    relative = others / np.maximum(largest, CANCELS / constants)
     return moved, np.maximum(resolved, relative.max(axis=1, initial=0.0))
 
 

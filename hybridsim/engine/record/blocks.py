@@ -122,6 +122,11 @@ class SegmentList(list[Segment]):
         """Return the modes of each segment (N, C)."""
         return np.array([segment.z for segment in self], dtype=np.int64).reshape(len(self), -1)
 
+    @property
+    def vectors(self) -> np.ndarray:
+        """Return the run-time vector of each segment (N, P)."""
+        return np.array([segment.p for segment in self]).reshape(len(self), -1)
+
     def states(self, index: np.ndarray, s: np.ndarray) -> np.ndarray:
         """Return states (k, n) of some segments at local times (k,), exact at the knots of the run."""
         system = self._system

@@ -215,6 +215,13 @@ class EventBlock(Sequence[Occurrence]):
         is_change = components < len(self._system.automata)
         return self._instants[events[is_change]], components[is_change]
 
+    def single_transitions(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """Return instants (E, 2) and guards (E,), or None if an event is not the transition of its guard's owner."""
+        components, owner = self._all_participants[1], self._system.owner
+        if not self._is_plain or self._first or not ((self._fired >= 0) & (self._fired < len(owner))).all():
+            return None
+        return (self._instants, self._fired) if (owner[self._fired] == components).all() else None
+
     def since(self, first: int) -> EventBlock:
         """Return a block of the events, starting with the event of a given number."""
         later = copy(self)

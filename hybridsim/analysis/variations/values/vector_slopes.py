@@ -86,6 +86,18 @@ class VectorSlopes:
             below[at : at + SIGNAL_SLOTS, P + v] = table.coefficients(origin)
         return found
 
+    @property
+    def is_fixed(self) -> bool:
+        """Whether the derivatives depend on the origin of local time alone, as `seeds_and_rates` returns them."""
+        return not self._tables and all(signal.is_fixed for signal in self._signals)
+
+    def seeds_and_rates(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return `seeds` at the origin 0 of local time, and their derivatives by the origin, without inputs."""
+        layout, by_origin = self.system.layout, np.zeros_like(self._fixed)
+        below = by_origin[self.system.n + 1 :, self.system.n + 1 + layout.discrete :]
+        below[layout.phases_at : layout.signals_at, : layout.parameters] = self.rates
+        return self._fixed, by_origin
+
     def constants(self) -> np.ndarray:
         """Return the values (P + V,) of the parameters and of the values of tables."""
         return np.array([*self.system.values.values(), *(table.value for _, table in self._tables)])
