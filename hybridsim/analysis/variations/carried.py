@@ -18,6 +18,8 @@ from dataclasses import replace
 import numpy as np
 
 from hybridsim.analysis.variations.changes import Changes, Place
+from hybridsim.analysis.variations.compiled.ordinary import NotOrdinary, are_of_the_model, passages_of
+from hybridsim.analysis.variations.compiled.passages import carry_ordinary
 from hybridsim.analysis.variations.directions import Carried, Directions
 from hybridsim.analysis.variations.event_times import EventTimes
 from hybridsim.analysis.variations.flow_derivatives import FlowDerivatives
@@ -30,8 +32,6 @@ from hybridsim.analysis.variations.off_zero import (
     off_zero,
     rates_of,
 )
-from hybridsim.analysis.variations.ordinary import NotOrdinary, Passage, are_of_the_model, guards_between
-from hybridsim.analysis.variations.ordinary_kernel import Passages, carry_ordinary
 from hybridsim.analysis.variations.rounds import (
     Rounds,
     batches,
@@ -50,7 +50,6 @@ from hybridsim.analysis.variations.sizes import sizes
 from hybridsim.analysis.variations.values.table_slopes import TableValue
 from hybridsim.analysis.variations.values.vector_slopes import VectorSlopes
 from hybridsim.engine.native.kernels import Precompiled
-from hybridsim.engine.native.struct_pack import packed
 from hybridsim.engine.record.segments import Segment
 from hybridsim.engine.system.system import System
 from hybridsim.errors import UsageError
@@ -132,18 +131,13 @@ class Carrier:
         regular = self._flow.regular()
         if regular is None or not self._vector.is_fixed:
             return None
-        pieces, moving = regular
+        parts, moving = regular
         try:
-            guards = guards_between(self.solution, self._rounding)
-            passage = Passage(self.solution, self._vector, moving)
-            delays, jumps = passage.at_events(guards)
-            holds, at_start, at_end = passage.held()
+            guards, passages = passages_of(self.solution, self._vector, moving, parts, self._rounding)
         except NotOrdinary:
             return None
-        first = np.searchsorted(pieces.number, np.arange(len(guards) + 1))
         starts, shifts = np.empty((len(guards), *Y.shape)), np.zeros((len(guards), Y.shape[1]))
         starts[0], end = Y, np.empty(Y.shape)
-        passages = packed(Passages(first, pieces.matrices, delays, jumps, holds, at_start, at_end))
         _carry_ordinary(passages, np.concatenate([Yd, G])[moving], starts, shifts, end, np.empty(Y.shape))
         segments = self.solution._segments
         begins = segments.origins().sum(axis=1) + segments.spans()[:, 0]

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from hybridsim.analysis.variations.collocation_kernel import accumulate
-from hybridsim.analysis.variations.compiled_flow import CompiledFlow
+from hybridsim.analysis.variations.compiled.collocation import accumulate
+from hybridsim.analysis.variations.compiled.flow import CompiledFlow
 from hybridsim.analysis.variations.smooth import (
     Intervals,
     Steps,
@@ -83,15 +83,15 @@ class FlowDerivatives:
         self._intervals = transitions(self._over, steps)
 
     def regular(self) -> tuple[Intervals, list[int]] | None:
-        """Return all pieces of the run and the moving constants, or None if some segments are stiff."""
+        """Return all parts of the run and the moving constants, or None if some segments are stiff."""
         return None if self._stiff or self._intervals is None else (self._intervals, self._moving)
 
-    def _over(self, pieces: Steps) -> tuple[np.ndarray, np.ndarray]:
-        """Return the derivatives (K, n, n + q) over pieces of segments, and how well each is resolved."""
-        found, tails = self._compiled.over(pieces)
+    def _over(self, parts: Steps) -> tuple[np.ndarray, np.ndarray]:
+        """Return the derivatives (K, n, n + q) over parts of segments, and how well each is resolved."""
+        found, tails = self._compiled.over(parts)
         bad = np.flatnonzero(np.isnan(tails))
         if len(bad):
-            some = Steps(*(each[bad] for each in pieces))
+            some = Steps(*(each[bad] for each in parts))
             found[bad], tails[bad] = over_intervals(self._slopes, some, self._scale, self._constants)
         return found, tails
 

@@ -1,6 +1,6 @@
-"""This module solves the equations of Gauss collocation of many pieces in compiled code.
+"""This module solves the equations of Gauss collocation of many parts in compiled code.
 
-The equations are those of `hybridsim.analysis.variations.smooth`. The eight nodes of a piece are one panel of
+The equations are those of `hybridsim.analysis.variations.smooth`. The eight nodes of a part are one panel of
 `hybridsim.engine.system.tangent_panel`.
 """
 
@@ -98,7 +98,7 @@ def _solve(M: Any) -> None:
 
 @inlined
 def _set_up(rule: Any, work: Any, outputs: Any, length: float) -> bool:
-    """Write the collocation equations of a piece; return whether all derivatives exist."""
+    """Write the collocation equations of a part; return whether all derivatives exist."""
     M, panel, n = work.system, work.panel, outputs.shape[0]
     width, total = work.seeds.shape[1], 0.0
     for i in range(WIDTH):
@@ -119,7 +119,7 @@ def _set_up(rule: Any, work: Any, outputs: Any, length: float) -> bool:
 
 @inlined
 def _unresolved(rule: Any, run: Any, M: Any, length: float, moved: Any) -> float:
-    """Write the derivatives over a piece from its solved equations, and return how well they are resolved."""
+    """Write the derivatives over a part from its solved equations, and return how well they are resolved."""
     n, width = moved.shape
     scale, tails, sizes, worst = run.scale, 0.0, 0.0, 0.0
     for b in range(width):
@@ -143,22 +143,22 @@ def _unresolved(rule: Any, run: Any, M: Any, length: float, moved: Any) -> float
 
 
 @kernel
-def over_pieces(
+def over_parts(
     tapes: Any,
     inputs: Any,
     rule: Any,
     run: Any,
     work: Any,
-    pieces: Any,
+    parts: Any,
     nodes: Any,
     matrices: Any,
     tails: Any,
 ) -> None:
-    """Write the derivatives (K, n, n + q) over pieces, and how well each is resolved: NaN without a derivative.
+    """Write the derivatives (K, n, n + q) over parts, and how well each is resolved: NaN without a derivative.
 
-    pieces: numbers of the segments (K,) and lengths (K,). nodes: local times (8 K,) and states (8 K, n).
+    parts: numbers of the segments (K,) and lengths (K,). nodes: local times (8 K,) and states (8 K, n).
     """
-    numbers, lengths = pieces
+    numbers, lengths = parts
     s, x = nodes
     last = -1
     for k in range(numbers.shape[0]):
@@ -217,7 +217,7 @@ def speeds_at(
 
 @kernel
 def accumulate(matrices: Any, totals: Any) -> None:
-    """Write the derivatives (K + 1, n, n + q) from the start of a segment to the ends of its K pieces."""
+    """Write the derivatives (K + 1, n, n + q) from the start of a segment to the ends of its K parts."""
     n, width = totals.shape[1], totals.shape[2]
     for a in range(n):
         for b in range(width):

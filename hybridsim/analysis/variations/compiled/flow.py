@@ -1,4 +1,4 @@
-"""This module passes the pieces of a run to the compiled collocation of `collocation_kernel`."""
+"""This module passes the parts of a run to `hybridsim.analysis.variations.compiled.collocation`."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from hybridsim.analysis.variations.collocation_kernel import (
+from hybridsim.analysis.variations.compiled.collocation import (
     FlowScratch,
     FlowTapes,
     Rule,
     RunArrays,
-    over_pieces,
+    over_parts,
     speeds_at,
 )
 from hybridsim.analysis.variations.smooth import CANCELS, GAUSS, TAIL, Steps
@@ -26,7 +26,7 @@ from hybridsim.engine.system.system import System
 from hybridsim.engine.system.tangent_panel import panel
 
 _RULE = packed(Rule(*map(np.ascontiguousarray, (GAUSS.A, GAUSS.b, GAUSS.coefficients[-TAIL:]))))
-_over_pieces, _speeds_at = Precompiled(over_pieces), Precompiled(speeds_at)
+_over_parts, _speeds_at = Precompiled(over_parts), Precompiled(speeds_at)
 
 
 @per_structure
@@ -40,7 +40,7 @@ def _tapes(system: System, modes: bytes) -> Any:
 
 
 class CompiledFlow:
-    """Computes derivatives of the states over pieces of the segments of a run.
+    """Computes derivatives of the states over parts of the segments of a run.
 
     Parameters
     ----------
@@ -93,14 +93,14 @@ class CompiledFlow:
             )
         )
 
-    def over(self, pieces: Steps) -> tuple[np.ndarray, np.ndarray]:
-        """Return the derivatives (K, n, n + q) over pieces, and how well each is resolved: NaN if they do not exist."""
-        lengths = pieces.ends - pieces.begins
-        s = (pieces.begins[:, None] + lengths[:, None] * GAUSS.nodes).ravel()
-        x = self._segments.states(np.repeat(pieces.number, WIDTH), s)
+    def over(self, parts: Steps) -> tuple[np.ndarray, np.ndarray]:
+        """Return the derivatives (K, n, n + q) over parts, and how well each is resolved: NaN if they do not exist."""
+        lengths = parts.ends - parts.begins
+        s = (parts.begins[:, None] + lengths[:, None] * GAUSS.nodes).ravel()
+        x = self._segments.states(np.repeat(parts.number, WIDTH), s)
         matrices, tails = np.empty((len(lengths), *self._shape)), np.empty(len(lengths))
-        number = np.ascontiguousarray(pieces.number, dtype=np.int64)
-        _over_pieces(
+        number = np.ascontiguousarray(parts.number, dtype=np.int64)
+        _over_parts(
             self._tapes, self._system.registers.inputs, _RULE, self._run, self._work, (number, lengths), (s, x),
             matrices, tails,
         )  # fmt: skip

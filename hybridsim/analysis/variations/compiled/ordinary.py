@@ -12,10 +12,12 @@ from typing import Any
 import numpy as np
 
 from hybridsim.analysis.variations.changes import EXACT, TANGENTIAL
-from hybridsim.analysis.variations.ordinary_kernel import Points, gradients_at
+from hybridsim.analysis.variations.compiled.passages import Passages, Points, gradients_at
+from hybridsim.analysis.variations.smooth import Intervals
 from hybridsim.analysis.variations.tapes import tangent_tape
 from hybridsim.analysis.variations.values.vector_slopes import VectorSlopes
 from hybridsim.engine.native.kernels import Precompiled
+from hybridsim.engine.native.struct_pack import packed
 from hybridsim.engine.record.blocks import SegmentBlock
 from hybridsim.engine.record.event_block import EventBlock
 from hybridsim.engine.series.dual_numbers import Dual, differentiated_rows
@@ -221,6 +223,18 @@ class Passage:
             for one in out
         ]
         return np.array(rows).transpose(2, 0, 1)
+
+
+def passages_of(
+    solution: Solution, vector: VectorSlopes, moving: list[int], parts: Intervals, slack: float
+) -> tuple[np.ndarray, Any]:
+    """Return the guards (N,) that end the segments of a run of ordinary events, and its packed `Passages`."""
+    guards = guards_between(solution, slack)
+    passage = Passage(solution, vector, moving)
+    delays, jumps = passage.at_events(guards)
+    holds, at_start, at_end = passage.held()
+    first = np.searchsorted(parts.number, np.arange(len(guards) + 1))
+    return guards, packed(Passages(first, parts.matrices, delays, jumps, holds, at_start, at_end))
 
 
 def _alike(rows: np.ndarray) -> Iterator[np.ndarray]:

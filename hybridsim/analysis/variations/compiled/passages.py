@@ -27,8 +27,8 @@ class Points(NamedTuple):
 class Passages(NamedTuple):
     """The linear maps of N segments and of the events between them, for changes of n states and q constants."""
 
-    first: np.ndarray  # (N + 1,) number of the first piece of each segment, and the number of pieces
-    matrices: np.ndarray  # (K, n, n + q) derivatives over the pieces
+    first: np.ndarray  # (N + 1,) number of the first part of each segment, and the number of parts
+    matrices: np.ndarray  # (K, n, n + q) derivatives over the parts
     delays: np.ndarray  # (N, n + q) derivatives of the time of the event at the end of each segment
     jumps: np.ndarray  # (N, n) rates before the event minus rates after it
     holds: np.ndarray  # (N,) whether a component holds
