@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -61,8 +62,32 @@ class Changed:
 
     def along(self, rates: np.ndarray) -> float:
         """Return the rate of the function for given rates of the states, or 0 if its terms cancel each other."""
-        terms = np.append(self.row * rates, self.by_time)
-        return float(terms.sum()) if abs(terms.sum()) > TANGENTIAL * np.abs(terms).sum() else 0.0
+        return float(speed_along(self.row, self.by_time, rates))
+
+
+def speed_along(rows: np.ndarray, by_time: Any, rates: np.ndarray) -> np.ndarray:
+    """Return rates of functions along a run (...,), which are 0 where their terms cancel each other.
+
+    rows (..., n), by_time (...,) : derivatives by the states and by time; rates (..., n) : rates of the states.
+    """
+    terms = np.concatenate([rows * rates, np.asarray(by_time)[..., None]], axis=-1)
+    speeds = terms.sum(axis=-1)
+    return np.where(np.abs(speeds) > TANGENTIAL * np.abs(terms).sum(axis=-1), speeds, 0.0)
+
+
+def is_at_zero(
+    values: np.ndarray, slopes: np.ndarray, flow: np.ndarray, x: np.ndarray, constants: np.ndarray, t: Any
+) -> np.ndarray:
+    """Return which functions (..., k) are zero except for rounding of their terms.
+
+    slopes (..., k, n + 1 + q) : derivatives by the states, by time and by the constants (..., q); flow, x (..., n) :
+    rates and states; t (...,) : the time.
+    """
+    sizes, n = np.abs(slopes), x.shape[-1]
+    passing = np.einsum("...ka,...a->...k", sizes[..., :n], np.abs(flow)) + sizes[..., n]
+    terms = np.einsum("...ka,...a->...k", sizes[..., :n], np.abs(x))
+    terms += np.einsum("...ka,...a->...k", sizes[..., n + 1 :], np.abs(constants))
+    return np.asarray(np.abs(values) <= EXACT * (terms + passing * np.abs(np.asarray(t))[..., None]))
 
 
 class Changes:
@@ -106,16 +131,15 @@ class Changes:
         others = np.concatenate([at.Yd, self.G])
         by = by_states @ at.Y + by_others @ others + np.outer(by_time, at.shift)
         states, times, constants = np.abs(by_states), np.abs(by_time), np.abs(by_others)
-        fixed = constants @ np.abs(np.concatenate([system.discrete(at.p), self.vector.constants()]))
+        numbers = np.concatenate([system.discrete(at.p), self.vector.constants()])
         size = states @ self._scale
         sizes = states @ np.maximum(np.abs(at.Y), at.large) + constants @ np.abs(others)
         sizes += np.outer(times, np.abs(at.shift)) + _ROUNDING / _ALIKE * np.outer(
-            size + fixed, 1.0 / self.own
+            size + constants @ np.abs(numbers), 1.0 / self.own
         )
-        passing = (states @ np.abs(flow) + times) * abs(at.origin + at.s)
-        exact = states @ np.abs(at.x) + fixed + passing
         values = found.values[0, n:]
-        is_zero, is_near = np.abs(values) <= EXACT * exact, np.abs(values) <= _ZERO * size
+        is_zero = is_at_zero(values, rows, flow, at.x, numbers, at.origin + at.s)
+        is_near = np.abs(values) <= _ZERO * size
         return [
             Changed(
                 value, by[k], sizes[k], by_states[k], float(by_time[k]), bool(is_zero[k]), bool(is_near[k])

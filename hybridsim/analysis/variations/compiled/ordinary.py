@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from hybridsim.analysis.variations.changes import EXACT, TANGENTIAL
+from hybridsim.analysis.variations.changes import is_at_zero, speed_along
 from hybridsim.analysis.variations.compiled.passages import Passages, Points, gradients_at
 from hybridsim.analysis.variations.smooth import Intervals
 from hybridsim.analysis.variations.tapes import tangent_tape
@@ -137,9 +137,8 @@ class Passage:
             points = self._points(at, 1)
             values, slopes = self._gradients(modes[at[0]], (int(guards[at[0]]),), points)
             rates, slope = values[:, :n], slopes[:, 0]
-            terms = np.concatenate([slope[:, :n] * rates, slope[:, n : n + 1]], axis=1)
-            speed = terms.sum(axis=1)
-            if (np.abs(speed) <= TANGENTIAL * np.abs(terms).sum(axis=1)).any():
+            speed = speed_along(slope[:, :n], slope[:, n], rates)
+            if not speed.all():
                 raise NotOrdinary
             delays[at] = -slope[:, self._chosen] / speed[:, None]
             jumps[at] = self._on_constraints(modes[at[0]], points, rates)
@@ -163,16 +162,10 @@ class Passage:
         held = z.copy()
         held[c] = automaton.hold
         values, slopes = self._gradients(held, limits, points)
-        sizes, constants = np.abs(slopes), np.abs(self._vector.constants())
-        discrete = np.abs(points.vectors[:, self._system.layout.discrete_slice])
-        fixed = np.concatenate(
-            [discrete, np.broadcast_to(constants, (len(discrete), len(constants)))], axis=1
-        )
-        passing = np.einsum("kga,ka->kg", sizes[:, :, :n], np.abs(values[:, :n])) + sizes[:, :, n]
-        exact = np.einsum("kga,ka->kg", sizes[:, :, :n], np.abs(points.x))
-        exact += np.einsum("kga,ka->kg", sizes[:, :, n + 1 :], fixed)
-        exact += passing * np.abs(points.origins + points.s)[:, None]
-        if (np.abs(values[:, n:]) <= EXACT * exact).any():
+        discrete = points.vectors[:, self._system.layout.discrete_slice]
+        constants = np.broadcast_to(self._vector.constants(), (len(discrete), len(self._vector.constants())))
+        numbers, times = np.concatenate([discrete, constants], axis=1), points.origins + points.s
+        if is_at_zero(values[:, n:], slopes, values[:, :n], points.x, numbers, times).any():
             raise NotOrdinary
 
     def _on_constraints(self, z: np.ndarray, points: Points, rates: np.ndarray) -> np.ndarray:
