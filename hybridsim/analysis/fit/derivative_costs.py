@@ -7,8 +7,8 @@ from collections.abc import Callable
 
 from hybridsim.solution import Solution
 
-# Seconds, from models with 0 to 140 events and 1 to 800 steps. They count until the costs are measured.
-_EXACT, _EXACT_SEGMENT, _EXACT_STEP = 1.5e-3, 0.5e-3, 0.09e-3  # of exact derivatives
+# Seconds, from models with 4 to 400 ordinary events and 14 to 2800 steps. They count until the costs are measured.
+_EXACT, _EXACT_SEGMENT, _EXACT_STEP = 1.8e-3, 0.02e-3, 0.005e-3  # of exact derivatives
 _RUN, _RUN_STEP = 0.5e-3, 0.0015e-3  # of a run in a compiled loop
 
 
