@@ -78,7 +78,7 @@ ARGUMENTS = {
     "engine/system/finite_differences.py::_series": 12,
     "engine/system/finite_differences.py::along": 10,
     "engine/system/finite_differences.py::run_differences": 12,
-    "engine/system/tangent_panel.py::run_tangents": 10,
+    "engine/series/tangent_panel.py::run_tangents": 10,
     "integrators/fixed_step/kernels.py::passed": 12,
     "integrators/fixed_step/moreau_kernels.py::moreau_step": 11,
     "integrators/fixed_step/moreau_kernels.py::moreau_steps": 16,

@@ -75,7 +75,7 @@ def speed_along(rows: np.ndarray, by_time: Any, rates: np.ndarray) -> np.ndarray
     return np.where(np.abs(speeds) > TANGENTIAL * np.abs(terms).sum(axis=-1), speeds, 0.0)
 
 
-def is_at_zero(
+def are_zero(
     values: np.ndarray, slopes: np.ndarray, flow: np.ndarray, x: np.ndarray, constants: np.ndarray, t: Any
 ) -> np.ndarray:
     """Return which functions (..., k) are zero except for rounding of their terms.
@@ -138,7 +138,7 @@ class Changes:
             size + constants @ np.abs(numbers), 1.0 / self.own
         )
         values = found.values[0, n:]
-        is_zero = is_at_zero(values, rows, flow, at.x, numbers, at.origin + at.s)
+        is_zero = are_zero(values, rows, flow, at.x, numbers, at.origin + at.s)
         is_near = np.abs(values) <= _ZERO * size
         return [
             Changed(

@@ -1,6 +1,6 @@
 """This module computes first derivatives of rates, guards, surfaces and monitors.
 
-This is forward automatic differentiation of the tape (`hybridsim.engine.system.tangent_panel`).
+This is forward automatic differentiation of the tape (`hybridsim.engine.series.tangent_panel`).
 """
 
 from __future__ import annotations
@@ -11,10 +11,10 @@ import numpy as np
 
 from hybridsim.engine.native.kernels import Precompiled
 from hybridsim.engine.series.optimise import live_rows
+from hybridsim.engine.series.tangent_panel import panel, run_tangents
 from hybridsim.engine.system.per_structure import spare_scratch
 from hybridsim.engine.system.slopes_at_edge import slopes_at_edge
 from hybridsim.engine.system.system import System
-from hybridsim.engine.system.tangent_panel import panel, run_tangents
 
 _run_tangents = Precompiled(run_tangents)
 

@@ -1,7 +1,7 @@
 """This module solves the equations of Gauss collocation of many parts in compiled code.
 
 The equations are those of `hybridsim.analysis.variations.smooth`. The eight nodes of a part are one panel of
-`hybridsim.engine.system.tangent_panel`.
+`hybridsim.engine.series.tangent_panel`.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 
 from hybridsim.engine.native.kernels import call_noinline, inlined, kernel
 from hybridsim.engine.native.simd.vectors import WIDTH
-from hybridsim.engine.system.tangent_panel import run_panel, set_numbers, set_points, slope_at
+from hybridsim.engine.series.tangent_panel import run_panel, set_numbers, set_points, slope_at
 
 
 class FlowTapes(NamedTuple):
@@ -48,7 +48,7 @@ class Rule(NamedTuple):
 class FlowScratch(NamedTuple):
     """Scratch arrays."""
 
-    panel: Any  # `hybridsim.engine.system.tangent_panel.Panel`
+    panel: Any  # `hybridsim.engine.series.tangent_panel.Panel`
     seeds: np.ndarray  # (n + 1 + P, n + q)
     system: np.ndarray  # (8 n, 8 n + n + q) matrix and right-hand sides of the collocation equations
     square: np.ndarray  # (2, n, n)

@@ -21,9 +21,9 @@ from hybridsim.analysis.variations.values.vector_slopes import VectorSlopes
 from hybridsim.engine.native.kernels import Precompiled
 from hybridsim.engine.native.simd.vectors import WIDTH
 from hybridsim.engine.native.struct_pack import packed
+from hybridsim.engine.series.tangent_panel import panel
 from hybridsim.engine.system.per_structure import per_structure
 from hybridsim.engine.system.system import System
-from hybridsim.engine.system.tangent_panel import panel
 
 _RULE = packed(Rule(*map(np.ascontiguousarray, (GAUSS.A, GAUSS.b, GAUSS.coefficients[-TAIL:]))))
 _over_parts, _speeds_at = Precompiled(over_parts), Precompiled(speeds_at)

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from hybridsim.analysis.variations.changes import is_at_zero, speed_along
+from hybridsim.analysis.variations.changes import are_zero, speed_along
 from hybridsim.analysis.variations.compiled.passages import Passages, Points, gradients_at
 from hybridsim.analysis.variations.smooth import Intervals
 from hybridsim.analysis.variations.tapes import tangent_tape
@@ -21,9 +21,9 @@ from hybridsim.engine.native.struct_pack import packed
 from hybridsim.engine.record.blocks import SegmentBlock
 from hybridsim.engine.record.event_block import EventBlock
 from hybridsim.engine.series.dual_numbers import Dual, differentiated_rows
+from hybridsim.engine.series.tangent_panel import panel
 from hybridsim.engine.system.per_structure import per_structure
 from hybridsim.engine.system.system import System
-from hybridsim.engine.system.tangent_panel import panel
 from hybridsim.solution import Solution
 
 _gradients_at = Precompiled(gradients_at)
@@ -165,7 +165,7 @@ class Passage:
         discrete = points.vectors[:, self._system.layout.discrete_slice]
         constants = np.broadcast_to(self._vector.constants(), (len(discrete), len(self._vector.constants())))
         numbers, times = np.concatenate([discrete, constants], axis=1), points.origins + points.s
-        if is_at_zero(values[:, n:], slopes, values[:, :n], points.x, numbers, times).any():
+        if are_zero(values[:, n:], slopes, values[:, :n], points.x, numbers, times).any():
             raise NotOrdinary
 
     def _on_constraints(self, z: np.ndarray, points: Points, rates: np.ndarray) -> np.ndarray:

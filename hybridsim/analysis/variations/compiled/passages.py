@@ -12,7 +12,7 @@ import numpy as np
 
 from hybridsim.engine.native.kernels import call_noinline, inlined, kernel
 from hybridsim.engine.native.simd.vectors import WIDTH
-from hybridsim.engine.system.tangent_panel import run_panel, set_numbers, set_points, slope_at
+from hybridsim.engine.series.tangent_panel import run_panel, set_numbers, set_points, slope_at
 
 
 class Points(NamedTuple):
