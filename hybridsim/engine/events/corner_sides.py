@@ -1,10 +1,10 @@
-"""Choose the sides of corners and loads just after an instant, before any other mode is chosen.
+"""Choose the modes that the state alone determines, such as the active branch of abs or min, at an instant.
 
-Each is a component whose mode follows from the state alone: a corner (`abs`, `min`, a piece of a table), a step in
-time, or the load of a contact that opens. A value beyond its error bound decides the side. At zero, the first
-derivative along the flow that is beyond its own bound decides. Corners can be nested, and the flow depends on the sides
-of other corners, so the sides are computed again until none changes. This ends, because the derivative that decides a
-side is of a lower order than what the side changes, or belongs to an inner corner.
+They are chosen just after the instant, before all other modes. They belong to corners (`abs`, `min`, a piece of a
+table), to steps in time, and to the loads of contacts that open. A value beyond its error bound decides the side. At
+zero, the first derivative along the flow that is beyond its own bound decides. Corners can be nested, and the flow
+depends on the sides of other corners, so the sides are computed again until none changes. This ends, because the
+derivative that decides a side is of a lower order than what the side changes, or belongs to an inner corner.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _ROUNDS_PER_MODE = 4  # orders of a series: each order settles at least one more
 def sides_along(
     resolution: EventData, z: np.ndarray, x: np.ndarray, has_flow: bool = True
 ) -> tuple[np.ndarray, dict[int, int]]:
-    """Choose the sides of corners and loads by the motion; return the new modes, and those guards that are zero.
+    """Choose the modes of corners and loads from the motion; return all modes, and the guards that are exactly zero.
 
     A guard that was located at zero is zero on both sides, whatever rounding makes of its value. With has_flow=False
     only values decide, because the modes of surfaces are not known yet.
@@ -58,13 +58,13 @@ def sides_along(
 
 
 def _way_back(automaton: Automaton, mode: int, to: int) -> int:
-    """Return the guard through which a mode leads back to the previous mode."""
+    """Return the guard of `mode` whose transition leads to the mode `to`."""
     ways = zip(automaton.guards[mode], automaton.targets[mode], strict=True)
     return next(g for g, targets in ways if to in targets)
 
 
 def take_corners(resolution: EventData) -> bool:
-    """Set the corners and loads of an event to their sides; return whether any side changed."""
+    """Set the modes of corners, such as abs or min, and of loads at an event; return whether any mode changed."""
     at, system = resolution.at, resolution.system
     if not system.led:
         return False

@@ -1,4 +1,4 @@
-"""Resolve the changes that are due at one instant: schedules, input jumps, then resets of crossed monitors."""
+"""Resolve the changes that are due at one instant: schedules, input jumps, then resets of monitors that fired."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def situation_when_due(
 def _with_evaluated(
     system: System, before: np.ndarray, x: np.ndarray, p: np.ndarray, z: np.ndarray, error: np.ndarray
 ) -> np.ndarray:
-    """Return the errors of all states at a scheduled time, including held states.
+    """Return error bounds of the states at a scheduled time, with new bounds for the held states.
 
     Held states were evaluated at a local time of the run-time vector `before`, and are judged at the origin of p. Both
     times are rounded.
@@ -80,7 +80,7 @@ def _with_evaluated(
 def apply_crossed(
     system: System, forward: bool, outcome: Outcome, s: float, monitors: MonitorSides
 ) -> Outcome:
-    """Apply the resets of monitors whose side an event, or the reset of another monitor, has changed."""
+    """Apply the resets of monitors that crossed zero in an event or through another monitor's reset."""
     changes = list(outcome.changes)
     while not outcome.status and forward and (due := monitors.fire(outcome, "reset")):
         monitors.fire(outcome)

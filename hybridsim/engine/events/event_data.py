@@ -49,7 +49,7 @@ class EventData:
         self.rank: dict[int, int] = {}  # position of each guard in the order in which they reached zero
 
     def locate(self, located: set[int]) -> None:
-        """Store the guards at which the event was located, and the components that the guards release."""
+        """Store the guards that were located at zero, and the guard that releases each held component."""
         self.fired[list(located)] = True
         for c, automaton in enumerate(self.system.automata):
             if automaton.has_surface and self.before[c] == automaton.hold:
@@ -106,7 +106,7 @@ class EventData:
             at.z[c] = side
 
     def pinned_states(self, components: list[int]) -> np.ndarray:
-        """Return a mask (n,) of the states that holding modes of some components determine."""
+        """Return a mask (n,) of the states that some components determine in their holding modes."""
         mask = np.zeros(self.system.n, dtype=np.bool_)
         mask[[i for c in components for i in self.system.pins.get(c, ())]] = True
         return mask

@@ -1,4 +1,4 @@
-"""Find the modes in which resets read the state, and the automata that certainly leave their modes."""
+"""Find the modes in which conditions and resets are evaluated, and the components that certainly change their modes."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def as_read_by_conditions(system: System, at: Situation, jumped: bool = False) -
 
 
 def certainly_leaving(resolution: EventData) -> set[int]:
-    """Return the components that leave their modes whichever modes the surfaces at zero take.
+    """Return the components that leave their modes for every choice of modes at the surfaces that are zero.
 
     The sides of their guards are set accordingly. If these surfaces have too many combinations of modes, only values of
     guards without forces are used.
@@ -102,7 +102,7 @@ def _modes_on_sides(resolution: EventData) -> tuple[np.ndarray, list[int]]:
 
 
 def _negative(resolution: EventData, owners: list[int], z: np.ndarray, order: int = ORDER) -> set[int]:
-    """Return the guards that become negative in the modes `z`, by their Taylor terms up to an order."""
+    """Return the guards whose Taylor series, up to an order, show that they become negative in the modes `z`."""
     series = resolution.series_of(z)
     side_of = side_after if resolution.forward else side_before
     numbers = [g for c in owners for g in resolution.system.automata[c].guards[z[c]]]

@@ -1,6 +1,7 @@
-"""Detect whether a jump of an input or of a corner moves a surface, so that its component is released.
+"""Detect whether the value of a surface jumps at an event, so that its component is released.
 
-For a closed gap the rate counts as well: a floor that jumps in speed strikes the body on it, or leaves it.
+Inputs, discrete states and corners such as `sign` can jump. For a closed gap the rate counts as well: a floor that
+jumps in speed strikes the body on it, or leaves it.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ _JOINED = 3.0  # ulps within which times count as equal, as in `hybridsim.engine
 
 
 def surfaces_jump(system: System, instant: Instant, at: Situation, forward: bool) -> bool:
-    """Return whether surfaces, or rates of closed gaps, jump at an instant at which inputs jump.
+    """Return whether values of surfaces, or rates of closed gaps, jump because inputs jump at an instant.
 
     Times that are equal within rounding count as one, at the last of them. The pieces before are those before all of
     them.
@@ -32,13 +33,13 @@ def surfaces_jump(system: System, instant: Instant, at: Situation, forward: bool
 
 
 def vectors_jump(system: System, at: Situation, before: np.ndarray, s_error: float = 0.0) -> bool:
-    """Return whether surfaces, or rates of closed gaps, change if inputs and discrete states jump at an event."""
+    """Return whether values of surfaces, or rates of closed gaps, jump because inputs or discrete states jump."""
     z = np.maximum(at.z, 0)
     return bool(system.surface_of) and _differ(system, at, ((before, z), (at.p.copy(), z)), s_error)
 
 
 def gaps_jump(system: System, at: Situation, before: np.ndarray, after: np.ndarray) -> bool:
-    """Return whether the rates of closed gaps differ between the two sides of corners."""
+    """Return whether the rates of closed gaps jump because corners such as sign change their active branch."""
     closed = any(
         system.automata[c].is_unilateral and at.z[c] == system.automata[c].hold for c in system.surface_of
     )
@@ -48,7 +49,7 @@ def gaps_jump(system: System, at: Situation, before: np.ndarray, after: np.ndarr
 def _differ(
     system: System, at: Situation, sides: Sequence[tuple[np.ndarray, np.ndarray]], s_error: float = 0.0
 ) -> bool:
-    """Return whether surfaces or gap rates change at one state, if run-time values and modes change."""
+    """Return whether surfaces or gap rates differ at one state for different run-time values and modes."""
     values, bounds = [], []
     for p, z in sides:
         p[system.layout.pin_at] = 0.0

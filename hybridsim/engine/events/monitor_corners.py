@@ -1,9 +1,9 @@
-"""Represent the monitors of a model as corners, so that compiled loops treat zeros of monitors like zeros of corners.
+"""Represent each monitor as a component whose mode is the sign of the monitor, so that compiled loops find its zeros.
 
-A corner of a monitor has two modes, ``+`` and ``-``, in which the monitor is positive and negative. The modes have the
-same rates. A zero of the monitor changes the mode and nothing else. The corners follow all other components, and their
-guards follow all other guards, so that both keep their numbers. A monitor that resets a state or ends the run has fatal
-guards, which the general mode loop resolves.
+Such a component is a corner, like one of ``abs``. Its two modes, ``+`` and ``-``, in which the monitor is positive and
+negative, have the same rates. A zero of the monitor changes the mode and nothing else. The corners follow all other
+components, and their guards follow all other guards, so that both keep their numbers. A monitor that resets a state or
+ends the run has fatal guards, which the general mode loop resolves.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ _SIDES_BY_DIRECTION = {"up": (1,), "down": (-1,), "both": (1, -1)}
 
 @dataclass
 class MonitorSides:
-    """The sides of the monitors at one instant, at which each monitor fires at most once.
+    """The signs of the monitors at one instant, and the monitors that have fired at this instant.
 
     Parameters
     ----------
@@ -38,14 +38,14 @@ class MonitorSides:
 
     @classmethod
     def of(cls, monitors: Sequence[Monitor], before: np.ndarray) -> MonitorSides:
-        """Return the sides of monitors whose motion before the instant is unknown."""
+        """Return the signs of the monitors without directions, because the motion before the instant is unknown."""
         return cls(monitors, before, np.zeros_like(before), np.zeros(len(before), dtype=np.bool_))
 
     @classmethod
     def located(
         cls, monitors: Sequence[Monitor], before: np.ndarray, series: Any, stopping: Sequence[int]
     ) -> MonitorSides:
-        """Return the sides of monitors, with directions from Taylor series just before the instant.
+        """Return the signs of the monitors, with directions from Taylor series just before the instant.
 
         stopping: monitors that were located to change their sides there.
         """

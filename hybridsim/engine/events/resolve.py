@@ -53,7 +53,7 @@ class EventResolution(ClusterChoice):
     # -- the rounds -----------------------------------------------------------------------------------------
 
     def run(self, fired: Iterable[int] | Mapping[int, int], resets: Iterable[tuple[object, ...]]) -> Outcome:
-        """Resolve the event with the guards located at zero, in time order, and the resets that are due."""
+        """Resolve the event from the guards located at zero, in the order of their times, and from the due resets."""
         located = {int(g) for g in fired}
         lost = message_of_located(self.system, self.at.z, located)
         self.rank = dict(fired) if isinstance(fired, Mapping) else {int(g): k for k, g in enumerate(fired)}
@@ -113,7 +113,7 @@ class EventResolution(ClusterChoice):
         )
 
     def _past_corners(self, open_: set[int]) -> set[int]:
-        """Set corners to their sides; return the other components whose guards still fire after this change.
+        """Update the active branches of corners such as abs; return the other components whose guards still fire.
 
         A zero that was located by a series past a corner, where the guard turns back, does not fire.
         """
@@ -128,7 +128,7 @@ class EventResolution(ClusterChoice):
         return others - staying
 
     def _first_modes(self, surfaces: set[int]) -> tuple[str, str] | None:
-        """Set the sides of corners after a change of state, and leave modes that end at this instant.
+        """Update corners such as abs after a change of state, then leave the modes that certainly end at this instant.
 
         Without this, a contact would be decided in a mode of an automaton that lasts for zero time.
         """
@@ -231,7 +231,7 @@ class EventResolution(ClusterChoice):
         status: str,
         message: str,
     ) -> Outcome:
-        """Return the present state with the sides and orders of guards and monitors, as an outcome."""
+        """Return the outcome of the event: the present state, with the signs of guards and monitors."""
         at = self.at
         return Outcome(
             at.x, at.p, at.z, self.sides, self.orders, *monitors, at.x_error, floors, monitor_floors,

@@ -87,7 +87,7 @@ class HybridState:
         return values
 
     def divide(self) -> None:
-        """Make this state the start of a new segment in unchanged modes, at which no guard is zero."""
+        """Mark this state as the start of a new segment in the same modes, with no guard at zero."""
         memory, layout = self.memory, self._layout  # views of arrays cost more than this
         memory[layout.floors], memory[layout.tail] = 0.0, layout.not_zero
 

@@ -1,4 +1,4 @@
-"""This module judges all combinations of modes among which the modes of a cluster are chosen."""
+"""This module judges the combinations of modes of coupled components, and chooses one of them."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def judged_candidates(
     keeps: np.ndarray,
     cluster: tuple[int, ...],
 ) -> JudgedCandidates:
-    """Choose among candidates in which contacts below their limits (`keeps`) stay in their holding modes.
+    """Judge combinations of modes and choose one; contacts in the mask `keeps` stay in their holding modes.
 
     If a member needs a unique motion, all candidates are judged.
     """
@@ -62,7 +62,7 @@ def judged_candidates(
 def completed(
     resolution: EventVerdicts, members: list[int], found: JudgedCandidates, cluster: tuple[int, ...]
 ) -> np.ndarray:
-    """Judge the candidates that are not judged yet, and return all verdicts."""
+    """Judge the remaining combinations of modes, and return the verdicts on all of them."""
     for number in np.flatnonzero(found.verdicts == _UNJUDGED):
         z = resolution.with_modes(members, found.candidates[number])
         found.verdicts[number] = resolution.verdict(z, cluster)

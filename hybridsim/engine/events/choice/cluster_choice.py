@@ -26,13 +26,13 @@ from hybridsim.engine.system.system import System
 
 
 def with_tied(system: System, members: list[int]) -> list[int]:
-    """Return the given components and the friction contacts along their gaps."""
+    """Return the given components, and the contacts whose velocity is proportional to the rate of one of their gaps."""
     tied = {along for gap, along, is_one in system.stop_couplings if is_one and gap in members}
     return sorted(tied.union(members))
 
 
 def together(system: System, members: list[int], candidates: np.ndarray) -> np.ndarray:
-    """Return the candidates in which a gap and the friction along the gap are both held or both free.
+    """Return the candidates in which a gap and the friction along its direction are both held or both free.
 
     If their velocities differ (a stop beside a belt), candidates in which both hold are removed.
     """
@@ -122,7 +122,7 @@ class ClusterChoice(EventVerdicts):
                 self.changes.append(Change(c, guards.get(c, ""), int(source[c]), int(mode), at.x, at.x))
 
     def _several(self, components: list[int], candidates: np.ndarray) -> tuple[str, str]:
-        """Return the status and the message if no candidate is preferred, or if a rate is not a number."""
+        """Return the status and the message for several possible motions, or for a rate that is not a number."""
         at = self.at
         for modes in candidates:
             lost = rates_without_value(self.system, at.s, at.x, at.p, self.with_modes(components, modes))

@@ -31,14 +31,14 @@ class EventVerdicts(EventData):
     is_thorough = False  # whether to judge all candidates, even if the choice does not need them
 
     def event(self, judged: np.ndarray = _NO_SERIES) -> JudgedEvent:
-        """Return the data for verdicts, with the series of the guards and their error bounds (2, G, 4)."""
+        """Return the data that a verdict reads; `judged` contains Taylor series of guards and their error bounds."""
         return JudgedEvent(
             self.before, self.at.z, self.fired, self.on_surface, self.released_to, judged, self.decreed,
             self.sides[None], self.orders[None], self.floors[None],
         )  # fmt: skip
 
     def judged(self, z: np.ndarray) -> JudgedEvent:
-        """Return the data for verdicts on the modes `z`, forward or backward in time."""
+        """Return the data that a verdict on the modes `z` reads; the series run in the direction of time of the run."""
         series = self.series_of(z)
         judged = np.array([series.guards, series.guard_bounds])
         if not self.forward:
@@ -81,7 +81,7 @@ class EventVerdicts(EventData):
         return {c: self.verdict_on_guards(self.at.z, [c], continuous) for c in components}
 
     def with_modes(self, components: list[int], modes: np.ndarray) -> np.ndarray:
-        """Return a copy of the modes with some modes replaced and the sides of corners updated."""
+        """Return a copy of the modes with some of them replaced, and with the branches of abs, min and max updated."""
         z = self.at.z.copy()
         z[components] = modes
         return sides_along(self, np.maximum(z, 0), self.at.x)[0] if self.system.led else np.maximum(z, 0)

@@ -38,7 +38,7 @@ def is_below_limit(automata: Any, event: Any, c: int) -> bool:
 def rank_candidates(
     modes: Any, total: int, count: int, current: Any, holds: Any, keeps: Any, ranks: Any
 ) -> None:
-    """Write the rank of each joint candidate, or NO_CAUSE for a release without a cause.
+    """Write the rank of each combination of modes, or NO_CAUSE if it releases a contact below its limit.
 
     modes (total, count): the candidates, one row each. current, holds (count,): the current and the holding modes.
     keeps (count,): contacts below their limits, which have no cause to leave their holding modes. Static friction above
@@ -56,7 +56,7 @@ def rank_candidates(
 
 @inlined
 def rank_of(unchanged: int, held: int, count: int) -> int:
-    """Return the rank of a candidate by its numbers of unchanged modes and of holding modes."""
+    """Return the rank of a candidate, which increases with the numbers of unchanged modes and of holding modes."""
     return held + (count + 1) * unchanged
 
 

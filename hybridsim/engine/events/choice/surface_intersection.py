@@ -52,7 +52,7 @@ def is_one_motion(resolution: EventVerdicts, members: list[int], candidates: np.
 
 
 def on_its_side(resolution: EventVerdicts, members: list[int], candidates: np.ndarray) -> int:
-    """Return the first candidate whose motion lies on the side that each of its modes requires, or 0.
+    """Return the number of the first candidate whose motion has the signs that its modes require, or 0 if none has.
 
     A body at rest may slip either way within rounding. Its holding mode leaves it a speed, or a rate, of some sign.
     """
@@ -147,7 +147,7 @@ def message_on_cascade(resolution: EventVerdicts) -> str:
 
 
 def _message_on_drift(resolution: EventVerdicts) -> str:
-    """Return a hint if a guard is slightly negative after a transition leads back to the guard's mode."""
+    """Return a hint if a guard is already negative when a transition leads back into its mode, else an empty text."""
     system, last = resolution.system, resolution.changes[-2:]
     if len(last) < 2 or last[0].component != last[1].component or last[0].source != last[1].target:
         return ""
@@ -187,7 +187,7 @@ def _message_on_negative_guard(resolution: EventVerdicts) -> str:
 
 
 def _message_on_opposed_modes(resolution: EventVerdicts) -> str:
-    """Return a hint on two modes if each mode moves the state across the same surface into the other mode."""
+    """Return a hint if each of two modes moves the state across one surface into the other mode."""
     model, last = resolution.system.model, resolution.changes[-2:]
     if len(last) < 2 or last[0].component != last[1].component or last[0].source != last[1].target:
         return ""

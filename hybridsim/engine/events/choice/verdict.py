@@ -109,7 +109,7 @@ def is_smooth(automata: Any, event: Any, z: Any, members: Any, jumps: Any) -> bo
 
 @inlined
 def zeros_of_surface(automata: Any, event: Any, z: Any, c: int, continuous: bool) -> int:
-    """Return how many Taylor coefficients of a component's surface are zero by definition of the event."""
+    """Return how many leading Taylor coefficients of a component's surface the event makes exactly zero."""
     if not event.on_surface[c] or z[c] == automata.hold[c]:
         return 0
     is_rate_zero = continuous and is_release(automata, event, z, c)

@@ -57,7 +57,7 @@ def has_known_times(system: System) -> bool:
 
 
 def known_time_arrays(system: System) -> Any:
-    """Return packed arrays for the known times of one call, or for the target of the call alone."""
+    """Return packed arrays for the known times of one call; a model without known times needs only the target."""
     most = MAX_KNOWN_TIMES + 1 if has_known_times(system) else 1
     return packed(
         KnownTimeArrays(

@@ -21,7 +21,7 @@ from hybridsim.engine.series.bounded import UNIT
 
 @inlined
 def _zeros_of(automata: Any, c: int, g: int, zeros: int) -> int:
-    """Return how many leading Taylor coefficients of a guard are zero, if `zeros` are zero for the surface of `c`."""
+    """Return the number of leading zero coefficients of a guard: `zeros` if it is the surface of `c`, otherwise 0."""
     return zeros if automata.place[g] == 0 and automata.owner[g] == c else 0
 
 

@@ -147,10 +147,10 @@ def _apply(automata: Any, functions: Any, at: Any, c: int, impulse: float, work:
 
 @inlined
 def _set_sides(automata: Any, tapes: Any, lin: Any, k: int, fired: int, work: Any) -> int:
-    """Write to `trial` the sides of slipping contacts and corners after an impact, and return the row of these modes.
+    """Write the slip directions and the active branches of corners after an impact to `trial`; return their row, or -1.
 
-    The corners are also those of monitors. k: row of the modes before. The result is -1 if a side is uncertain, if a
-    monitor acts, or if a guard of another kind is negative.
+    A corner is an `abs`, a `min` or the like, or a monitor. k: row of the modes before. Return -1 if a sign is
+    uncertain, if a monitor acts, or if a guard of another kind is negative.
     """
     trial, row = work.trial, k
     for i in range(tapes.active_start[k], tapes.active_start[k + 1]):

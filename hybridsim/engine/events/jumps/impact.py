@@ -22,7 +22,7 @@ Failure = tuple[str, str]
 
 
 def strike(resolution: EventData, open_: set[int]) -> Failure | None:
-    """Compute the collision of contacts whose gaps close; `open_` keeps those that are at rest afterwards.
+    """Compute the collision of contacts whose gaps close; only contacts at rest afterwards remain in `open_`.
 
     A contact at zero gap with a velocity of separation is open from now on.
     """

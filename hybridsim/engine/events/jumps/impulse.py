@@ -1,4 +1,4 @@
-"""Compute the impulses of simultaneous impacts, and the rates after the impacts, as a pure function.
+"""Compute the impulses of simultaneous impacts and the rates after them, without access to the model.
 
 Of the contacts that take part, some are normal (their rates are those of gaps) and the others tangential:
 
@@ -160,7 +160,7 @@ def _same(one: Answer, other: Answer) -> bool:
 
 
 def _between(problem: ImpactProblem, dead: Answer, lively: Answer) -> Answer:
-    """Return the last impulses on the line from `dead` to `lively` whose work is not positive.
+    """Return the impulses closest to `lively`, on the line from `dead` to `lively`, whose work is not positive.
 
     The work is quadratic in the position w on this line, not positive at 0 and positive at 1.
     """

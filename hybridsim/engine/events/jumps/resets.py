@@ -142,7 +142,7 @@ def _evaluated(system: System, at: Situation, key: Key) -> tuple[np.ndarray, np.
 
 
 def _of_numbers(system: System, at: Situation, key: Key) -> np.ndarray:
-    """Return the errors of states due to the rounding of numbers in a reset."""
+    """Return the errors of all variables that the rounding of numbers in the formulas of a reset causes."""
     found = np.zeros(system.n + len(system.model.discrete))
     values = dict(zip(system.names, at.x.tolist(), strict=True))
     discrete = at.p[system.layout.discrete_slice].tolist()

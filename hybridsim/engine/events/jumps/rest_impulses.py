@@ -6,7 +6,7 @@ import numpy as np
 
 
 def stopped(x: np.ndarray, rates: np.ndarray, slopes: np.ndarray, changes: np.ndarray) -> np.ndarray:
-    """Return the states after impulses along m contacts that make the rates (m,) of their gaps zero.
+    """Return the states after impulses at m contacts that bring the rates (m,) of their gaps to zero.
 
     slopes, changes (m, n): derivatives of the rates by the states, and of the states by impulses (`System.impulses`).
     If contacts depend on each other, P has the smallest norm.
@@ -16,7 +16,7 @@ def stopped(x: np.ndarray, rates: np.ndarray, slopes: np.ndarray, changes: np.nd
 
 
 def loaded(changes: np.ndarray, loads: np.ndarray, sliding: np.ndarray) -> np.ndarray:
-    """Return the changes (m, n) of the states by normal impulses and the friction that they cause.
+    """Return the changes (m, n) of the states per unit normal impulse, including the friction that it causes.
 
     loads (2, m, m): friction per load, forward and backward (`System.impulses`). sliding (m,): 1, -1, or 0 for a
     contact that does not slide.
