@@ -1,4 +1,4 @@
-"""Templates of the matrices of linear modes, which are valid for all similar parameter values."""
+"""This module records how the matrices of linear modes follow from the parameters, to repeat it for other values."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ class MatrixTemplate:
         self.recipe: Recipe = Recipe(numbers, None if begun is None else begun.recipe)
 
     def _first_read(self, system: System, met: np.ndarray) -> Iterable[Monomial]:
-        """Return functions of time in an order that does not depend on the modes that a run enters first.
+        """Return the functions of time in a fixed order, whichever modes a run enters first.
 
         The order of sums depends on it. If all mode vectors are entered, they are read in their order.
         Otherwise vectors that differ in one component come first; they contain almost all functions of time.
@@ -121,7 +121,7 @@ class MatrixTemplate:
 
 @kernel
 def put_entries(registers: Any, flow: Any, guards: Any, n: int, A: Any, rows: Any, usable: Any) -> None:
-    """Write the matrices of all points and a mask of the usable modes."""
+    """Write the matrices for all rows of registers, and a mask of the modes whose matrices are finite."""
     for entries, out in ((flow, A.reshape(-1)), (guards, rows.reshape(-1))):
         size = out.shape[0] // registers.shape[0]
         for point in range(registers.shape[0]):

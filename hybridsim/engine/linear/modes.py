@@ -53,7 +53,7 @@ def _reader(system: System, atoms: Atoms, z: np.ndarray, p: Sequence[float] | No
 
 
 def _are_same(one: Read | NotLinear | None, other: Read | NotLinear | None) -> bool:
-    """Return whether two registers have the same linear form; an unknown weight is NaN and equals another one."""
+    """Return whether two registers have the same linear form; unknown coefficients (NaN) count as equal."""
     if isinstance(one, dict) and isinstance(other, dict):
         return one.keys() == other.keys() and all(_are_same(w, other[k]) for k, w in one.items())
     is_unknown = one != one and other != other  # true for NaN only
@@ -61,7 +61,7 @@ def _are_same(one: Read | NotLinear | None, other: Read | NotLinear | None) -> b
 
 
 class _Changes:
-    """Computes linear forms of modes that differ little from the first modes, by new values of few registers."""
+    """Computes the linear forms in other modes from those in the first modes; only changed registers are computed."""
 
     def __init__(self, system: System, p: Sequence[float] | None) -> None:
         self.system = system
@@ -125,7 +125,7 @@ def modes_of(
 
 
 def single_changes(system: System) -> np.ndarray:
-    """Return the combination of all first modes, and all combinations that differ from it in one component."""
+    """Return the combination of the first mode of each component, and all combinations that differ in one component."""
     first = np.zeros(len(system.automata), dtype=np.int64)
     vectors = [first]
     for c, automaton in enumerate(system.automata):
@@ -210,7 +210,7 @@ _first_reason = per_structure(_reason_at, most=_MAX_CACHED)
 
 
 def is_linear_beside_corners(system: System) -> bool:
-    """Return whether each mode is linear on both sides of each corner, for the given parameter values."""
+    """Return whether each mode is linear in each branch of abs, min, max and sign, for the given parameter values."""
     return _is_linear_beside_corners(system, None) or _is_linear_beside_corners(
         system, tuple(system.values.values())
     )

@@ -91,7 +91,7 @@ def functions_of_time(lin: Any, s: float, p: Any, factors: Any, w: Any) -> None:
 
 @inlined
 def errors_of_time(lin: Any, s_error: float, factors: Any, w_error: Any) -> None:
-    """Compute error bounds for the last call of `functions_of_time`, given the error of the local time."""
+    """Compute error bounds of the results of the last `functions_of_time`, from the error of the local time."""
     for a in range(lin.kinds.shape[0]):
         kind, value, other = lin.kinds[a], factors[2 * a], factors[2 * a + 1]
         if kind == TIME:
@@ -239,7 +239,7 @@ def slopes_of(lin: Any, k: int, x: Any, w: Any, out: Any) -> None:
 
 @inlined
 def state_sizes(lin: Any, k: int, before: Any, after: Any, larger: Any, scale: Any) -> None:
-    """Compute the sizes of the terms of each state at both ends of a segment.
+    """Compute bounds of the terms that add up to each state, at the start and the end of a segment.
 
     larger: scratch space for the sizes of the coordinates.
     """

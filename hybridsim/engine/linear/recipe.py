@@ -67,7 +67,7 @@ class Numbers:
 
 
 def _operators(op: int) -> tuple[Any, Any]:
-    """Return two methods of `Traced` for an operation: one keeps the order of the operands, one exchanges them."""
+    """Return two methods of `Traced` for an operation, such as __sub__ and __rsub__ for a difference."""
 
     def first(self: Traced, other: float) -> Traced:
         return self.numbers.operation(op, (self, other))[0]
@@ -162,7 +162,7 @@ class Recipe:
         return registers.reshape(-1) if holds else None
 
     def values_at(self, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Repeat the computation for many inputs; also return a mask of the inputs with the same comparisons."""
+        """Repeat the computation for many inputs; also return a mask of the inputs for which all comparisons agree."""
         found, holds = np.empty((len(inputs), len(self._start))), np.empty(len(inputs), dtype=np.bool_)
         again = self._rows, self._start, self._compared, np.array(inputs, dtype=float)
         _repeat_each(*again, np.empty_like(self._start), found, holds)

@@ -19,7 +19,7 @@ _NEAR, _SLOWEST = 0.125, 1e-300
 
 @kernel
 def leave_out(A: Any, guards: Any, n: int, usable: Any) -> None:
-    """Mark the modes with usable coefficients, and set the guards of other modes to -1.
+    """Write a mask of the modes with finite coefficients, and set the guards of the other modes to -1.
 
     A (K, m, m), guards (K, G, m). Two surfaces that cannot be held together give modes with numbers that are not
     finite, which runs have only as neighbours. In the tables their motion is NaN, so that a compiled loop stops there,
@@ -68,7 +68,7 @@ def write_bases(A: Any, n: int, flows: Any, inverse: Any, states: Any, spreads: 
 
 @kernel
 def write_lengths(flows: Any, lasting: Any, near: Any) -> None:
-    """Write for each mode the time over which its closed form is accurate, and the length of a short time.
+    """Write for each mode how long its closed form is accurate, and up to which time a Taylor series is used.
 
     It is accurate until numbers overflow or blocks lose accuracy. Coordinates of one block have errors relative to the
     largest of them. If one grows faster than the others, such as a load that is still very small, the rounding error

@@ -125,7 +125,7 @@ class _Rows:
         self.size, self.all = layout.size, layout.zeros()
 
     def part(self, first: int, count: int) -> LinearTables:
-        """Return the tables of the modes in the rows from `first` up to `count`."""
+        """Return the tables of the modes in the rows from `first` to `count` - 1."""
         tables: LinearTables = self.all
         if first or count < self.most:
             fields = ((name, getattr(tables, name)) for name in LinearTables._fields)
@@ -134,7 +134,7 @@ class _Rows:
         return tables
 
     def gone_on_with(self, first: int, count: int) -> _Rows:
-        """Return this memory with `count` rows; if its spare rows are not free, return a larger copy."""
+        """Return this memory for `count` rows, or a larger copy if the spare rows do not suffice or are in use."""
         with _lock:
             rows = self
             if self.count != first or count > self.most:

@@ -184,7 +184,7 @@ class Emitter:
         return "\n".join([*lines, "    return 0"])
 
     def _changes(self, branch: Iterable[Assign], moving: dict[str, str]) -> dict[str, str]:
-        """Return the change of each name in a branch as text, in order; an empty text means no change."""
+        """Return the differential of each name that a branch assigns, as text; an empty text means zero."""
         moving, found = dict(moving), {}
         for assign in branch:
             terms = []

@@ -58,7 +58,7 @@ class HeldStates:
         self._lengths: dict[Held, Any] = {c: lowering.sp.Integer(0) for c in self.projected}
 
     def by_component(self, states: dict[Held, Any]) -> dict[int, tuple[int, ...]]:
-        """Return the states of each component's constraints, by component."""
+        """Return the sorted indices of the states that the constraints of each component determine, by component."""
         found: dict[int, tuple[int, ...]] = {}
         for (c, _), i in states.items():
             found[c] = tuple(sorted({*found.get(c, ()), *(i if isinstance(i, tuple) else (i,))}))

@@ -339,7 +339,7 @@ class Lowering(LoweringState):
         return items, conditions
 
     def _count_phases(self) -> None:
-        """Convert all resets and outputs, so that their frequencies are known before phases are numbered."""
+        """Convert all resets and outputs, because the frequencies in them must be known before phases are numbered."""
         choices = [c for k in self.components for m in k.modes for g in m.guards for c in g.then]
         choices += [k.limit for k in self.components if k.limit]
         for part in (*choices, *self.model.monitors, *self.model.schedules):

@@ -146,7 +146,7 @@ class LoweringState:
         return e
 
     def gradient(self, e: Any) -> dict[int, Any]:
-        """Return the derivatives of an expression with respect to the states in it, by number, in order."""
+        """Return the derivatives of an expression with respect to its states, by the index of the state."""
         if e not in self._gradients:
             numbers = sorted(self._number[x] for x in e.free_symbols & self._number.keys())
             self._gradients[e] = {i: self.sp.diff(e, self.states[i]) for i in numbers}

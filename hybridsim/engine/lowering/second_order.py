@@ -33,7 +33,7 @@ class Partner:
     factor: Any
 
     def share(self, c: int, d: int, sp: Any) -> Any:
-        """Return a coefficient of the condition that relay `c` and its partner slide with equal weights."""
+        """Return the coefficient of relay `d` in the condition that relay `c` and its partner have equal weights."""
         if d == c:
             return sp.Integer(1)
         return -sp.sign(self.factor) if d == self.component else sp.Integer(0)

@@ -53,7 +53,7 @@ def stop_couplings(
 def without_share(
     lowering: LoweringState, pairs: list[StopCoupling], c: int, d: int, entry: Any, of_held: Any
 ) -> tuple[list[Item], Any]:
-    """Return one coefficient of contact `c`, which is `of_held` while a gap along this contact is closed."""
+    """Return a coefficient of contact `c`: `of_held` while the gap of a coupled stop is closed, otherwise `entry`."""
     items: list[Item] = []
     for tie in pairs:
         if tie.along == c:
@@ -69,7 +69,7 @@ def without_share(
 def coupling_help(
     lowering: LoweringState, pairs: list[StopCoupling], p: int, effect: dict[tuple[int, int], Any]
 ) -> tuple[list[Item], Any]:
-    """Return the friction force that helps to keep a gap closed in stick, with the items that compute it."""
+    """Return program items and the largest pull that sticking friction can take before the gap opens."""
     sp, total = lowering.sp, lowering.sp.Integer(0)
     items: list[Item] = []
     for tie in pairs:
@@ -97,7 +97,7 @@ def coupling_help(
 
 
 def reported_forces(lowering: LoweringState, pairs: list[StopCoupling]) -> dict[Any, Any]:
-    """Return the forces to report, by name; the pull of a closed stop is reported as friction."""
+    """Return the forces to report, by name; the part of a stop force that pulls is reported as friction."""
     sp, found = lowering.sp, {}
     for tie in pairs:
         if tie.is_one:

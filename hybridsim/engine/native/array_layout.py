@@ -40,7 +40,7 @@ if ENABLED:
 
 
 def release(pack: Any) -> None:
-    """Give the arrays of a pack back to their layout, which uses them again; nothing else may use them."""
+    """Give the arrays of a pack back to their layout for reuse; the caller must not use them any more."""
     if ENABLED:
         pack._layout.take_back_pack(pack)
 
@@ -123,7 +123,7 @@ class ArrayLayout:
             self._returned.append(block)
 
     def packed(self, blocks: tuple[np.ndarray, ...], skipped: tuple[int, ...]) -> list[Any]:
-        """Return the arrays of each named tuple as a pack, without the first rows that `skipped` counts."""
+        """Return each named tuple of arrays as a pack; `skipped` is the number of rows to omit from each array."""
         packs: list[Any] = []
         if not ENABLED:
             arrays = iter(zip(self.rows(blocks), skipped, strict=True))
@@ -138,7 +138,7 @@ class ArrayLayout:
         return packs
 
     def zeros(self) -> Any:
-        """Return new arrays of zeros as a pack, for a layout of one named tuple in one block."""
+        """Return arrays of zeros as a pack; this requires a layout of one named tuple in one block."""
         try:
             pack = self._released.pop()
             pack._blocks[0].fill(0)

@@ -177,7 +177,7 @@ def load_whole(path: Path | None) -> bytes | None:
 
 
 def _made_by_us(root: Path) -> tuple[list[Path], list[Path]]:
-    """Return the cache folders of compiled code that hybridsim has marked as its own, and unmarked ones."""
+    """Return the cache folders that contain the mark of hybridsim, and the folders without this mark."""
     ours, others = [], []
     for entry in sorted(root.glob("engine-*")):
         is_folder = entry.is_dir() and not entry.is_symlink()

@@ -75,7 +75,7 @@ def _translated(text: str, name: str) -> str:
 
 
 def translated(text: str, names: Sequence[str]) -> str:
-    """Translate functions, of which later ones may call earlier ones, into one LLVM module."""
+    """Translate functions into one LLVM module; a function may call the functions before it."""
     module = ir.Module(names[0])
     for definition in python_tree(text).body:
         function = Translator(module, definition).function

@@ -31,7 +31,7 @@ def _taking_part(
     recorded: Any,
     participants: Any,
 ) -> tuple[int, int, bool]:
-    """Return the number of participants of some events, and the number of components among them.
+    """Write the participants of events; return their number, and the number of components among them.
 
     A participant is a component that changes its mode or is reset, a monitor, or a schedule that is due.
     may_return (C,): whether an event of the component may leave its mode unchanged. before, after (E, C) or (E, C + M):

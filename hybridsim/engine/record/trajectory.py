@@ -182,5 +182,5 @@ class Task:
 
     @cached_property
     def beginning(self) -> tuple[Any, ...]:
-        """Return a key of the start, which is equal for runs of one system with the same start."""
+        """Return a key of the initial time, direction and state; equal keys mean the same start of the run."""
         return self.t0, self.forward, self.x0.tobytes(), self.z0.tobytes(), self.discrete.tobytes()

@@ -225,7 +225,7 @@ def _before(
 def _with_touches(
     coefficients: np.ndarray, bounds: np.ndarray, rows: np.ndarray, is_first: bool, is_last: bool
 ) -> np.ndarray:
-    """Return the sign intervals; intervals with values within the rounding error are undecided.
+    """Return the rows of `sign_pattern`; an interval in which rounding may hide a zero gets an undecided sign.
 
     The misfit only shows roundings that differ from sample to sample. A common one, such as that of the steps
     before, shifts the dip and stays hidden. The ends of a step have their own rules for rounding. Where the

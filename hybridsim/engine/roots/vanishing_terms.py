@@ -68,7 +68,7 @@ def _sizes(u: Any, order: int, h: float) -> tuple[float, float, float]:
 
 @inlined
 def may_end(u: Any, kind: int, size: float) -> bool:
-    """Return whether a function of the polynomial u may limit the step, by a fast test."""
+    """Return, by a fast test, whether a function of the polynomial u may limit the step."""
     return kind == ROOT or size - abs(u[0]) > _SEEN
 
 

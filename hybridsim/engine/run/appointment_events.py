@@ -1,4 +1,4 @@
-"""Test by the motion just after an input jump or a schedule whether located guards fire.
+"""Decide whether located guards fire, from the motion just after an input jump or a schedule at the same time.
 
 A guard fires only if it is negative just after. A zero located by the motion before may turn back or stay at zero, such
 as a load that touches zero.
@@ -22,7 +22,7 @@ from hybridsim.engine.system.system import System
 def events_before_appointment(
     system: System, instant: Instant, found: Located, schedules: tuple[int, ...], forward: bool
 ) -> Located:
-    """Return a located event without the guards that wait until the scheduled change has been made.
+    """Return a located event without the guards that must be examined again after the scheduled change.
 
     Guards that do not become negative on the new pieces of inputs are dropped. The rest is resolved on these pieces,
     while conditions and resets read the inputs before a jump. A load at zero waits for schedules that are due.

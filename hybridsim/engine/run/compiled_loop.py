@@ -108,7 +108,7 @@ class CompiledLoop:
         self.renew()
 
     def pass_monitors(self, corners: MonitorCorners) -> None:
-        """Let this loop, which treats monitors as corners, record monitor events of the original model."""
+        """Make this loop record the events of monitors, although its system represents monitors as corners."""
         self.corners, self.system, self.kernels.recorded = corners, corners.plain, corners.plain
 
     def look_ahead(self, timetable: Timetable, end: Instant) -> None:
@@ -212,7 +212,7 @@ class CompiledLoop:
         )  # fmt: skip
 
     def _record(self) -> list[Any]:
-        """Return packs of the unused rows of the record, for all methods and for this method."""
+        """Return the unused rows of the record: a pack for each part of the layout."""
         kernels, (steps, first) = self.kernels, self.used
         if self.memory is None:
             key = self.steps, kernels.columns

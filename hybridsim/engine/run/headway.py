@@ -128,7 +128,7 @@ class Headway:
             )
 
     def _fades(self, now: Instant, spent: float, left: float) -> bool:
-        """Return whether a run that is far from its end has almost stopped, although its cost doubled several times."""
+        """Return whether a run advances less and less each time its cost doubles, and is far from its end."""
         self._cost += spent
         if self._cost < self._twice:
             return False

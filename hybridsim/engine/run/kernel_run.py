@@ -31,7 +31,7 @@ _NO_STATES = np.zeros(0)
 def record_layout(
     system: System, steps: int, rows: Any, keeps_starts: bool, *fields: tuple[Any, tuple[int, ...]]
 ) -> ArrayLayout:
-    """Return the layout of the arrays that the kernels write; events are kept longer than steps."""
+    """Return the layout of the arrays that the kernels write, with separate memory blocks for events and for steps."""
     return ArrayLayout(
         (LoopRecord, rows),
         (
@@ -144,7 +144,7 @@ class KernelRun:
 
     @property
     def is_full(self) -> bool:
-        """Return whether the call ended early, because arrays were full or it included only some known times."""
+        """Return whether the call ended because arrays were full or because it covered only the first known times."""
         return self.code == FULL or (self.code == AT_TARGET and not self.is_at_target)
 
     @property
@@ -165,7 +165,7 @@ class KernelRun:
 
     @property
     def adopted(self) -> Instant | None:
-        """Return the last instant at which a guard fired or a known time was passed."""
+        """Return the last instant at which a guard fired or a known time was passed, or None if there is none."""
         return Instant(*self._array("clocks")[self.first + self.events].tolist()) if self.events else None
 
     @property
@@ -199,7 +199,7 @@ class KernelRun:
         return np.asarray((fires >= 0) & (fires < self.system.guard_count))
 
     def plain_modes(self, modes: np.ndarray) -> np.ndarray:
-        """Remove the columns of corners that represent monitors from modes (k, C)."""
+        """Return modes (k, C) without the columns of the corners that represent monitors."""
         return modes if self.corners is None else np.ascontiguousarray(modes[:, : len(self.system.automata)])
 
     def outcome(self) -> Outcome:

@@ -190,7 +190,7 @@ class Locator:
         return clear
 
     def contradicts_flow(self, step: Step, hit: Hit, errors: np.ndarray, is_accurate: bool) -> bool:
-        """Return whether the early zero of a guard that starts at zero is only an error of the first step.
+        """Return whether the early zero of a guard that starts at zero is only a numerical error of the first step.
 
         A corner keeps its side if the flow rises from the located zero, and the next segment would begin in the same
         way. A first step of order one may have such an error. Another guard must have changed by more than rounding,

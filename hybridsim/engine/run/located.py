@@ -88,11 +88,11 @@ class Located:
     waiting: frozenset[int] = frozenset()
 
     def scope(self, system: System) -> set[int]:
-        """Return the components that take part in the event before schedules are applied."""
+        """Return the components that take part in the event; waiting components are resolved after the schedules."""
         return set(range(len(system.automata))) - self.waiting
 
     def is_event(self, system: System) -> bool:
-        """Return whether an event happens at the end of the run; changes of side at corners do not count."""
+        """Return whether there is an event at the end of the run; changes of branch in abs, min or max do not count."""
         owners = set(system.owner[list(self.fired)].tolist())
         return bool(owners.difference(system.led)) or bool(self.monitors.leads.any())
 
@@ -189,7 +189,7 @@ def as_stepped(system: System, at: Situation, arrival: Arrival, segment: Segment
 def _as_due(
     system: System, origin: Instant, at: Situation, series: Any, arrival: Arrival, known_at: float
 ) -> tuple[Situation, Any]:
-    """Return the state at a scheduled time, with wider error bounds if more functions are zero within these bounds."""
+    """Return the state at a scheduled time; widen the error bounds if more functions are zero within the wider ones."""
     slopes = np.abs(system.flow(at.s, at.x, at.p, at.z)) if system.n else 0.0
     wide = replace(at, x_error=at.x_error + known_at * slopes, s_error=at.s_error + known_at)
     known = system.series(wide.s, wide.x, wide.p, wide.z, wide.x_error, wide.s_error)
@@ -214,7 +214,7 @@ def _zero_count(system: System, origin: Instant, at: Situation, arrival: Arrival
 
 
 def _is_near(series: Any, arrival: Arrival, guard: int, s: float) -> bool:
-    """Return whether a near-grazing of a guard is the same zero as the event."""
+    """Return whether a minimum of a guard near zero coincides with the event, within the error of its time."""
     return abs(arrival.s - s) <= 2.0 * time_error(series.guards[guard], series.guard_bounds[guard])
 
 

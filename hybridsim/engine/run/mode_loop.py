@@ -231,7 +231,7 @@ class ModeLoop:
         return target, Appointment(target, (), is_renewal=True)
 
     def _arrival(self, segment: SegmentRun, bound: float, step_size: float | None) -> Arrival:
-        """Return the end of a segment, or the point at which another method continues."""
+        """Integrate a segment and return its end, or the point at which another method continues."""
         try:
             return segment.run(bound, step_size)
         except TakenOver:

@@ -267,7 +267,7 @@ class SegmentRun:
         return self._at_step_end(step, found)
 
     def _start_again(self, step: Step) -> Step:
-        """Return a first step shorter than the given step; some methods compute its length from the tolerances."""
+        """Restart the method with a shorter first step, and return this step."""
         self.refused = abs(step.s1)
         self.counters.rejected += 1
         self.last_step = SHORTER * self.refused
@@ -287,7 +287,7 @@ class SegmentRun:
         return want in (0, direction)
 
     def _is_recorded(self, hit: Hit, first: tuple[Hit, bool] | None) -> bool:
-        """Return whether a monitor's crossing is only recorded, because the run does not stop before the crossing."""
+        """Return whether a monitor's crossing needs nothing but a record, and no event precedes it in the step."""
         is_before = first is None or hit.theta < first[0].theta
         recorded = self.monitors[hit.number].action == "record"
         return is_before and recorded and self._fires_in(hit.number, hit.direction)

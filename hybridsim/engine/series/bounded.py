@@ -196,7 +196,7 @@ def _higher(op: int, V: Any, E: Any, a: int, b: int, c: int, out: int, k: int) -
 
 @kernel
 def _logic(op: int, V: Any, E: Any, a: int, b: int, c: int, out: int, k: int) -> None:
-    """Compute coefficient k of comparisons, choices and corners, on the side to which the argument moves."""
+    """Compute coefficient k of comparisons, conditional values, abs, min and max, in the branch that applies next."""
     if op == ops.ABS:
         sign = _first_sign(V, a, k)
         _put(V, E, out, k, sign * V[a, k], E[a, k])

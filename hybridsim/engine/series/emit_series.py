@@ -203,7 +203,7 @@ def _start(tape: ModeTape, stride: int) -> _Expansion:
 
 
 def _in_fixed_order(code: _Expansion) -> _Expansion:
-    """Add instructions that store the costly values of coefficient 0, and return the code."""
+    """Add instructions that store coefficient 0 of expensive operations, and return the code."""
     tape, stride = code.tape, code.stride
     for op, *_, out in tape.rows:
         if op in _COSTLY:

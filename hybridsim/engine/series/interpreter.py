@@ -162,7 +162,7 @@ def _higher(op: int, V: Any, a: int, b: int, c: int, out: int, k: int) -> None:
 
 @kernel
 def _logic(op: int, V: Any, a: int, b: int, c: int, out: int, k: int) -> None:
-    """Compute coefficient k of comparisons, choices and corners, on the side to which the argument moves."""
+    """Compute coefficient k of comparisons, conditional values, abs, min and max, in the branch that applies next."""
     if op in (ops.ABS, ops.MIN, ops.MAX):
         sign = 0.0
         for i in range(k + 1):

@@ -59,7 +59,7 @@ def two_product(a: float, b: float) -> tuple[float, float]:
 
 
 def multiples(start: float, k: np.ndarray, period: float) -> np.ndarray:
-    """Return the scheduled times (m, 2) with the numbers k (m,), bit for bit equal to the results of `multiple`."""
+    """Return the scheduled times (m, 2) number k (m,); each equals the result of `multiple` bit for bit."""
     high, error = _plain(two_product)(k.astype(float), period)
     total, rest = _plain(two_sum)(start, high)
     return np.stack(_plain(two_sum)(total, rest + error), axis=1)
@@ -90,7 +90,7 @@ def multiple(start: float, k: int, period: float) -> Instant:
 
 
 def rest_of_rate(rate: float, period: float) -> float:
-    """Return 2 pi/period - rate for a rate that is this quotient within rounding errors."""
+    """Return 2 pi/period - rate accurately, for a rate that differs from 2 pi/period by rounding errors only."""
     product, error = two_product(rate, period)
     return ((_TWO_PI[0] - product) - error + _TWO_PI[1]) / period
 

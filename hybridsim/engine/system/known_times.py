@@ -74,7 +74,7 @@ class KnownTimes(NamedTuple):
         )
 
     def of_like_lengths(self) -> KnownTimes:
-        """Return the known times up to the first input interval of another order of magnitude."""
+        """Return the known times before the length of the input intervals changes its order of magnitude."""
         m = int(np.argmax(self.lengths != self.lengths[0]))
         if m == 0:
             return self
@@ -117,7 +117,7 @@ class TimesAhead:
         self._passed = 0  # number of times in the block up to the present instant
 
     def _is_simple(self, k: int) -> bool:
-        """Return whether a schedule changes discrete states only, or nothing; amounts to add are sums in its reset."""
+        """Return whether a schedule neither ends the run nor changes states; it may change discrete states."""
         system, key = self.system, ("schedule", k)
         if system.model.schedules[k].terminate:
             return False

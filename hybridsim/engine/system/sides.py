@@ -1,4 +1,4 @@
-"""This module finds modes that the state alone determines: sides of corners and jumps, intervals of tables."""
+"""This module finds modes that the state alone determines, such as the active branch of abs or a table interval."""
 
 from __future__ import annotations
 

@@ -81,7 +81,7 @@ class Signal:
 
     @property
     def is_polynomial(self) -> bool:
-        """Return whether each piece is a polynomial of time; a sine is constant here, since it is lowered as text."""
+        """Return whether each piece is a polynomial of time, which is false for a chirp only; sines are expressions."""
         return self.kind != "chirp"
 
     def ahead(self, after: Instant, most: int) -> tuple[np.ndarray, np.ndarray]:
@@ -139,7 +139,7 @@ class Signal:
         return knots[order], rows[order]
 
     def _step_turns(self, near: Instant) -> list[tuple[Instant, float]]:
-        """Return the changes of a step input near an instant, each with the new value."""
+        """Return the times near an instant at which a step input changes, each with the new value."""
         if self._period == 0.0:
             return [(Instant(time), value) for time, value in self._turns]
         k0 = math.floor(float(near) / self._period)
@@ -208,7 +208,7 @@ class Signal:
 def step_turns(
     number: Mapping[str, float], declared: Input
 ) -> tuple[float, list[tuple[float, float]], float]:
-    """Return the initial value of a step input, its changes, and its period (or 0).
+    """Return the initial value of a step input, the times and new values of its changes, and its period (or 0).
 
     Raises
     ------

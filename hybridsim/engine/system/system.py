@@ -166,7 +166,7 @@ class System(_Frame):
         return any(z[c] == self.automata[c].hold for c in (*self.pins, *self.projected))
 
     def evaluated(self, z: np.ndarray) -> list[int]:
-        """Return the states that the modes `z` compute from their constraints."""
+        """Return the indices of the states that holding modes among `z` compute from constraints."""
         return [i for c, held in self.pins.items() if z[c] == self.automata[c].hold for i in held]
 
     # -- values ---------------------------------------------------------------------------------------------

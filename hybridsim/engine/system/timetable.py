@@ -96,7 +96,7 @@ class Timetable:
         )
 
     def ahead(self, k: int, after: Instant, most: int) -> np.ndarray:
-        """Return at most `most` next times (m, 2) of a schedule after an instant; equal times are repeated."""
+        """Return at most `most` times (m, 2) of a schedule after an instant; times that occur twice are repeated."""
         times, start, period, count = self._schedules[k]
         if times:
             first = bisect_right(times, after)
@@ -115,7 +115,7 @@ class Timetable:
         return np.asarray(2.0 * np.spacing(np.maximum(np.abs(near), largest)))
 
     def _count(self, k: int, instant: Instant) -> int:
-        """Return how many pending times of a schedule equal an instant within rounding; the result is 1 for a clock."""
+        """Return how many pending times of a schedule equal an instant within rounding, or 1 for a clock."""
         times, wide = self._schedules[k][0], 2.0 * self._slack(instant)
         if not times:
             return 1

@@ -43,7 +43,7 @@ _NO_INTERVALS = np.empty(0)
 def _follow(
     gap: float, now: float, i: int, known: int, longest: float, shortest: float, resolution: float, work: Any
 ) -> bool:
-    """Process the i-th interval of a series of events; return whether the series may have reached its limit."""
+    """Process interval `i` between events; return whether shrinking intervals may have reached their limit."""
     before, falls, ended = work[0], work[1], False
     is_nothing = gap <= max(shortest, _ULPS * 2.0**-52 * abs(now))
     end = max(resolution, _END * 2.0**-52 * abs(now), _FAR_DOWN * longest)
@@ -79,7 +79,7 @@ def may_end(
     work: Any,
     last: Any,
 ) -> tuple[bool, int]:
-    """Return whether a series of intervals continues or may have ended, and the number of its intervals.
+    """Return whether the intervals of a component still shrink or may have reached their limit, and their number.
 
     In a series an interval is shorter than the one a turn before it, or negligible, many times in a row. The series has
     not ended while the next interval, predicted by the last factor, exceeds the threshold.
@@ -225,7 +225,7 @@ class Accumulation:
             self._unjudged.discard(c)
 
     def limit_of_all(self, instants: np.ndarray, owners: np.ndarray) -> Limit | None:
-        """Add successive events (E, 2), each of one component (E,), and return the first limit, or None."""
+        """Add the times (E, 2) of events and their components (E,); return the first limit of events, or None."""
         count = len(instants)
         is_short = count <= _STORED_INTERVALS + 1  # a series there has forecasts, which need single events
         if count < 2 or (is_short and self.paces):
@@ -354,7 +354,7 @@ def _expected(pace: Pace, instant: Instant) -> float | None:
 
 
 def _steadier(before: Pace, limit: float, least: float) -> tuple[float, float, float]:
-    """Return the most stable forecast of the limit so far, with its last change and its least change.
+    """Return the forecast of the limit that changed least so far, with the last change and the least change.
 
     The first forecasts miss the deviation of the series from a geometric one. The last ones are dominated by rounding,
     unless the events are located at zero.

@@ -68,7 +68,7 @@ def bounces_of(outcome: Outcome, now: Instant, x_minus: np.ndarray) -> dict[int,
 
 
 def last_bounces(system: System, happened: Sequence[Occurrence]) -> dict[int, Bounce]:
-    """Return the last recorded event as a bounce of each component that it belongs to."""
+    """Return the last recorded event as a bounce, by component; return an empty dict if no component had an event."""
     last = next((o for o in reversed(happened) if o.kind != "monitor"), None)
     components = [
         c for c, automaton in enumerate(system.automata) if last and automaton.name == last.component
@@ -105,7 +105,7 @@ def may_be_hidden(system: System, outcome: Outcome, happened: Sequence[Occurrenc
 
 
 def _barely_seen(system: System, outcome: Outcome, bounces: dict[int, Bounce]) -> dict[int, _Departure]:
-    """Return the starts of flights that are so short that rounding may hide their loss of speed."""
+    """Return, by component, the start of a flight so short that rounding may hide how much speed it loses."""
     found = {}
     for c, last in bounces.items() if system.has_tape else ():
         automaton = system.automata[c]

@@ -29,7 +29,7 @@ def vector_of(count: int) -> np.ndarray:
 
 
 def rows_of(matrix: np.ndarray, parts: Sequence[int] = ()) -> np.ndarray:
-    """Pad the columns of matrices (..., rows, columns) with zeros, separately for each part."""
+    """Pad groups of columns of matrices (..., rows, columns) with zeros; `parts` contains the widths of the groups."""
     parts = parts or (matrix.shape[-1],)
     out = np.zeros((*matrix.shape[:-1], sum(map(filled_up, parts))))
     source = target = 0

@@ -78,7 +78,7 @@ guard_parts_of = per_structure(GuardParts)
 
 
 def _mode_parts(system: System, z: np.ndarray) -> tuple[np.ndarray, bool, np.ndarray]:
-    """Return the rows that guards need in one combination of modes, whether they are linear, and the step rows."""
+    """Return the rows that compute the guards, whether guards are linear, and the rows that a step computes."""
     tape = system.optimised_tape(z)
     guard_registers, rates = tape.guards[system.active(z)], tape.derivatives
     guards = live_rows(tape.rows, guard_registers)

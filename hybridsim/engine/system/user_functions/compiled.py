@@ -210,7 +210,7 @@ def _constant(value: float) -> Any:
 
 
 def _one_more(write: Any, place: int, component: int, mode: int, rest: Any) -> Any:
-    """Return a function that writes one number, then calls `rest`; the number is 1 in modes that do not use it."""
+    """Return a function that writes one number, or 1 in modes without this number, and then calls `rest`."""
 
     @numba.njit
     def write_row(s: float, x: Any, p: Any, z: Any, out: Any) -> None:
