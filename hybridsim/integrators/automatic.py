@@ -50,9 +50,7 @@ def choose(system: System, x0: np.ndarray, z0: np.ndarray, span: tuple[float, fl
         obstacle = "inputs" if model.inputs else _monitors_for_python(system)
         if not obstacle:
             return Choice("exact", "its modes are linear in the states")
-        rest = (
-            f" (the model has {obstacle}, with which exact may be slower: name integrator='exact' to try it)"
-        )
+        rest = f" (the model has {obstacle}, so exact may be slower; pass integrator='exact' to try it)"
     steps = _steps_for_stability(system, x0, z0, span)
     in_python = bool(model.inputs) or system.has_corners or span[1] < span[0]
     if steps > _MANY or (steps > _MANY_IN_PYTHON and in_python and _is_apart(system, x0, z0, span[0])):

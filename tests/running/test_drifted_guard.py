@@ -33,7 +33,7 @@ def test_a_guard_that_has_drifted_is_named_with_its_value_and_a_remedy(integrato
     value = float(solution.message.split("Guard up is ")[1].split()[0])
     assert value == pytest.approx(-1e-6 * 0.57955, rel=0.1)  # the time for which the limit held
     assert "leads to free" in solution.message
-    assert "let that transition set what the guard depends on" in solution.message
+    assert "let a reset of that transition set the states on which the guard depends" in solution.message
 
 
 @pytest.mark.parametrize("integrator", ["cvode-bdf", "cvode-adams", "taylor", "dop853"])

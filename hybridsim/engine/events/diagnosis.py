@@ -196,8 +196,8 @@ def _power_without_series(system: System, x: np.ndarray, ahead: np.ndarray) -> s
                 text, place = write(base), state.der.place or state.place
                 return (
                     f"{place.prefix if place else ''}'{write(node)}' in the rate of {state.name} has no Taylor series "
-                    f"at {text} <= 0, as its exponent is {power:g} given by a name; write the number itself, or use an "
-                    "integrator without Taylor series, such as dop853"
+                    f"at {text} <= 0, because its exponent {power:g} is given by a name: write the number itself, "
+                    "or use an integrator without Taylor series, such as dop853"
                 )
     return ""
 

@@ -119,7 +119,7 @@ class HeldStates:
         return ModelError(
             f"the {' and '.join(titles)} of "
             + ", ".join(lowering.components[c].name for c in components)
-            + " are not independent: they cannot all be kept at zero by one state each",
+            + " are not independent: they cannot all be kept at zero, each by a different state",
             place=lowering.place(components[0]),
             remedy=remedy,
         )
@@ -130,7 +130,7 @@ class HeldStates:
         titles = dict.fromkeys(self.lowering.title(c, plural=True) for c in components)
         return ModelError(
             f"the {' and '.join(titles)} of {names} depend on each other in a circle: they cannot be solved "
-            "one after the other for one state each",
+            "one after the other, each for a different state",
             place=self.lowering.place(components[0]),
             remedy=f"declare one of the {' or '.join(titles)} as a state, or use an hs.MechanicalSystem",
         )

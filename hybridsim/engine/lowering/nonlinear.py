@@ -43,5 +43,7 @@ def nonlinear(lowering: LoweringState, c: int, d: int, others: set[Any]) -> Mode
             f"{' and '.join(partners)} multiply each other in the rate of the switching function "
             f"'{lowering.written(c)}': at the intersection of their surfaces the sliding motion is not unique"
         )
-        remedy = "write the rates as sums of terms with one surface each, or declare the regions as modes"
+        remedy = (
+            f"write the rates as sums of terms with one of {', '.join(partners)} in each, or declare modes"
+        )
     return ModelError(f"surface {component.name}: {message}", place=lowering.place(c), remedy=remedy)

@@ -82,7 +82,7 @@ def coupling_help(
         if limit.free_symbols & set(lowering.unknown.values()):
             raise ModelError(
                 f"the load of {component.name} depends on the normal force of an impact, and {component.name} acts "
-                f"along the gap of {lowering.components[p].name}",
+                f"along the gap of {lowering.components[p].name}: this combination is not supported",
                 place=component.place,
                 remedy="use an hs.MechanicalSystem with moreau",
             )

@@ -125,8 +125,8 @@ class NativeStepper:
         if 0.0 in found:
             if result.status == 1 and result.t[-1] == 0.0:
                 raise StepFailure(
-                    "solve_ivp stops at the event from which it restarts; its sign test includes the start of a "
-                    "step, so it detects again an event function that is zero at the restart and does not increase"
+                    "solve_ivp stops again at the event from which it restarts, because its sign test includes the "
+                    "start of a step, where the event function is zero and does not increase"
                 )
             steps.append(Step(0.0, 0.0, x0, x0, dense_of(result.sol), tuple(found[0.0])))
         for s1 in map(float, ends):

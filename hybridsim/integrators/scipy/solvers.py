@@ -173,7 +173,7 @@ class ScipyBDF(ScipyIntegrator):
     when: ClassVar[str] = "stiff modes, few events, loose tolerances"
     lacks: ClassVar[dict[str, str]] = {
         **_NOISE,
-        "poles": "after a trial beyond a pole it restarts at order one, with steps below the rounding of time",
+        "poles": "after a trial step beyond a pole it restarts at order one, with steps too short to change the time",
     }
     dense_is_accurate: ClassVar[bool] = True
     solver: ClassVar[str] = "BDF"

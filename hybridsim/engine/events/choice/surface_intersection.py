@@ -161,8 +161,8 @@ def _message_on_drift(resolution: EventVerdicts) -> str:
         if value < 0.0:
             return (
                 f". Guard {change.guard} is {value:.6g} where a transition leads to {automaton.modes[change.source]}. "
-                "If it should be zero there, integration errors have accumulated: let that transition set what the "
-                "guard depends on, or pass a smaller rtol"
+                "If it should be zero there, integration errors have accumulated: let a reset of that transition set "
+                "the states on which the guard depends, or pass a smaller rtol"
             )
     return ""
 
@@ -181,7 +181,7 @@ def _message_on_negative_guard(resolution: EventVerdicts) -> str:
         return ""
     return (
         f". Guard {change.guard} is {value:.6g} in {automaton.modes[mode]} before and after its transition. "
-        "A guard must be positive while its mode is active: turn its sign around, or let the transition change a "
+        "A guard must be positive while its mode is active: reverse its sign, or let the transition change a "
         "state that the guard depends on"
     )
 
@@ -206,6 +206,7 @@ def _message_on_opposed_modes(resolution: EventVerdicts) -> str:
         return ""
     names = " and ".join(component.modes[change.source].name for change in last)
     return (
-        f". Modes {names} drive the motion against each other across one surface. If the motion should slide along it, "
-        f'declare a switching surface: [surfaces.NAME] expr = "{guards[0].expr.text}" (NAME is +1 or -1 on its sides)'
+        f". Modes {names} move the state across the same surface, each into the other mode. "
+        "If the motion should slide along this surface, declare a switching surface: [surfaces.NAME] expr = "
+        f'"{guards[0].expr.text}" (NAME is +1 or -1 on its sides)'
     )
