@@ -1,4 +1,4 @@
-"""Take the first steps with a method of high order if the errors of a multistep method would hide a guard."""
+"""Start a multistep method with steps of high order if its own first steps are too inaccurate for a guard."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def with_first_steps(
     make: Callable[[float, np.ndarray], Stepper],
     keeps_low: bool = True,
 ) -> Stepper:
-    """Start a multistep method, with first steps of high order if its errors would hide a guard.
+    """Start a multistep method; take first steps of high order if its errors could exceed the value of a guard.
 
     A guard is hidden if it grows late, or if it is low: if states jump when it is zero, and it is thrown up and falls
     back while the states change by less than atol/rtol, as in the last of infinitely many bounces. All of this time
@@ -65,7 +65,7 @@ def _jumps(system: System) -> np.ndarray:
 
 
 def throws(terms: np.ndarray, direction: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the maxima of guards from their first three Taylor terms, and the times of their return to zero.
+    """Return the maxima of guards and the times at which they return to zero, both from three Taylor terms.
 
     A guard that is not pulled back has the height inf.
     """
@@ -79,7 +79,7 @@ def throws(terms: np.ndarray, direction: float) -> tuple[np.ndarray, np.ndarray]
 def changes(
     flow: Flow, guards: np.ndarray, s: float, x: np.ndarray, sizes: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the values of guards, and how much they change if each state changes by its size."""
+    """Return the values of guards, and bounds of their changes if each state changes by its entry in `sizes`."""
     values = flow.guards(np.full(flow.n + 1, s), np.vstack([x, x + np.diag(sizes)]))[:, guards]
     return values[0], np.abs(values[1:] - values[0]).sum(axis=0)
 

@@ -1,4 +1,4 @@
-"""This module computes dense output for stiff modes, by interpolation of the ends of the last steps.
+"""This module computes dense output for stiff modes, by a polynomial through the states after the last steps.
 
 In a stiff mode a state deviates from its slow motion by a rounding error or a tolerance. Its derivatives are
 this deviation times powers of a rate far above one over the step, and are useless. The values themselves are

@@ -194,7 +194,7 @@ def begin_segment(start: Any, model: Any, call: Any, state: Any, work: Any, own:
 
 @inlined
 def next_step(call: Any, own: Any, rows: Any, s: float) -> int:
-    """Return CONTINUES, or a reason to leave the segment at the local time s."""
+    """Return CONTINUES if the segment may take another step from the local time s, otherwise the reason to leave it."""
     taken = own.counts[TAKEN]
     if s > call.longest[0]:
         return STOPPED

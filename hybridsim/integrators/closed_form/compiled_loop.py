@@ -47,7 +47,7 @@ class ClosedFormKernels(MethodKernels):
         self.lin: LinearTables
 
     def part_of(self, known: KnownTimes) -> KnownTimes:
-        """Return the known times up to the first interval of an input that is much longer or shorter.
+        """Return the known times before the first input interval that is much longer or shorter than those before it.
 
         Tables for long segments would be inaccurate in a short piece. Its coefficients are large, and in a long
         segment they would have large effects. A state has an error relative to these.

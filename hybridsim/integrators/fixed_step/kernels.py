@@ -15,7 +15,7 @@ CONTINUES = -1
 
 @inlined
 def leaves_side(before: float, after: float) -> bool:
-    """Return whether a monitor changes from one side to zero or to the other side."""
+    """Return whether a monitor changes from a positive or negative value to zero or to the other sign."""
     return (before > 0.0 and after <= 0.0) or (before < 0.0 and after >= 0.0)
 
 
@@ -23,7 +23,7 @@ def leaves_side(before: float, after: float) -> bool:
 def brought_to_zero(
     address: Any, s: float, x: Any, p: Any, z: Any, fresh: Any, is_first: bool, before: Any, after: Any
 ) -> bool:
-    """Return whether a monitor became zero through the modes at the start of a step, not through the motion.
+    """Return whether new modes at the start of a step, and not the motion, made a monitor zero or changed its sign.
 
     address: the monitors' function, whose values are written to before; after: their values at the end of the
     last step. Monitors for which this holds are marked in fresh.

@@ -47,7 +47,7 @@ def _left(before: np.ndarray, after: np.ndarray) -> np.ndarray:
 
 
 def _scale(states: np.ndarray) -> np.ndarray:
-    """Return the largest size of each state."""
+    """Return the largest absolute value of each state."""
     sizes: np.ndarray = np.abs(states).max(axis=0)
     return sizes
 
@@ -55,7 +55,7 @@ def _scale(states: np.ndarray) -> np.ndarray:
 def _checkpoint(
     instant: Instant, arrays: dict[str, np.ndarray], states: np.ndarray, *others: Any
 ) -> Checkpoint:
-    """Return a checkpoint that includes the largest size of each state."""
+    """Return a checkpoint that includes the largest absolute value of each state."""
     return Checkpoint(instant, arrays | {"scale": _scale(states)}, *others)
 
 
@@ -312,7 +312,7 @@ class FixedStepRun:
         return self.system.rows("monitors", len(names), np.array([s]), x[None, :], free, self.z)[0]
 
     def _turning_back(self, before: np.ndarray, after: np.ndarray) -> np.ndarray:
-        """Return a mask of the monitors that are exactly zero at this instant and return to their previous side."""
+        """Return a mask of the monitors that are exactly zero at this instant and return to their previous sign."""
         back = np.zeros(len(after), dtype=np.bool_)
         if (after == 0.0).any():  # use the inputs after this instant
             series = self.system.series(0.0, self.x, self._vector(), self.z, np.zeros(len(self.x)), 0.0)
@@ -418,7 +418,7 @@ class FixedStepRun:
             record.occurrences.add(events)
 
     def _side_of_zeros(self, z: np.ndarray) -> None:
-        """Replace stick in the stored modes by the slip direction that follows, because sgn(v) has no stick mode."""
+        """Replace each stick mode in the record by the slip mode that follows it, because sgn(v) has no stick mode."""
         for c, _, _, hold, *_ in surface_table(self.system):
             for k in np.flatnonzero(z[:-1, c] == hold)[::-1]:
                 z[k, c] = z[k + 1, c]
