@@ -20,8 +20,8 @@ _INTRODUCTION = """\
 
 {answer}
 
-The answer of each scene is known. It is a closed form, or a number with at least 30 digits. These digits are
-computed by a program that shares no code with the package. The command `hybridsim atlas` runs all scenes with all
+A scene is a model with a known answer. The answer is a closed form, or a number with at least 30 digits. A program
+that shares no code with the package computed these digits. The command `hybridsim atlas` runs all scenes with all
 methods.
 
 ![scenes against integrators, a verdict for each pair](matrix.png)
@@ -43,44 +43,41 @@ A method is *right* in a scene if it satisfies four conditions:
 and unit/120000, if the run needs at most 2e6 steps |
 | `scipy-rk45 cooldown` | rtol 1e-9, guards ignored for 1e-2, 1e-3 and 1e-4 units after each event |
 
-The *unit* of a scene is its typical time, which is the period of the forcing or about one oscillation. The scene's
-tolerance applies to methods with error control. `rk4-dichotomy` bisects its steps. Its tolerance is at least 1e-5.
-Other fixed-step methods place events at the ends of steps. Their tolerance is at least 4.2e-4, the length of two
-steps of unit/4800. In scenes longer than fifty units, `scipy-rk23` runs with rtol 100 times as large.
+The *unit* of a scene is its typical time, which is the period of the forcing or about one oscillation. Each scene has
+a tolerance, which applies to methods with error control. For `rk4-dichotomy`, which bisects its steps, the tolerance
+is at least 1e-5. Other fixed-step methods place events at the ends of steps. For these methods the tolerance is at
+least 4.2e-4 units, the length of two steps of unit/4800. In scenes longer than fifty units, `scipy-rk23` runs with
+rtol 100 times as large.
 
-In the tables of the scenes, a number follows the name of a method. This number is the larger of two errors of the
-last setting. One is the error of event times, in units of the scene. The other is the error of states, relative to
-their largest true value. If the error decreases with the step, the table also has the observed order of
-convergence. Integrators also run the scenes that they do not support according to their stated limits. In these
-scenes they fail for the stated reason.
+In the tables of the scenes, a number follows the name of a method. This number is the larger of two errors at the
+last setting in the table above. One is the error of event times, in units of the scene. The other is the error of
+states, relative to their largest true value. If the error decreases with the step, the table also has the observed
+order of convergence. Each integrator states in `lacks` the features that it does not support. The atlas also runs
+scenes that need such a feature. In these scenes the missing feature is the reason of a failure or refusal.
 
 Most methods use the event location and the mode selection of the engine. The exceptions are the fixed-step methods, and
-methods with native events, a cooldown or regularized friction. If all methods are right in a scene, its text describes
-the failure of other programs.
+methods with native events, a cooldown or regularized friction. If all methods are right in a scene, the text of the
+scene describes how other programs fail.
 
-The search for events of `solve_ivp` itself fails by these mechanisms:
+The event search of `solve_ivp` fails for the following reasons:
 
 | mechanism | effect |
 | --- | --- |
-| closed sign test | The test of signs includes both ends of a step. A guard that is zero where a run or a \
-restart begins \
-fires at the end of the first step, if it is then negative or zero again. |
-| only step ends | Signs are tested only at the ends of a step. Two zeros within one step are missed, and so is \
-a dip below \
-zero. |
+| closed sign test | The test of signs includes both ends of a step. A guard may be zero at the start of a run or \
+after a restart. The test finds an event in the first step, if the guard is negative or zero at the end of this step. |
+| only step ends | Signs are tested only at the ends of a step. Two zeros within one step are missed. |
 | Brent's method | The root finder stops with an error after 100 iterations if a zero is of third order. |
-| two values at a step end | Signs are tested on the state at the end of a step. The zero is searched on the \
-dense output, \
-which differs there by rounding. The root finder then finds no change of sign and stops with an error. |
-| dense output | A zero is found on the dense output, which is less accurate than the steps. |
-| trial steps | A step beyond the domain of the model is tried, and its state or Jacobian is not a number. The solver \
-fails before it searches for the event. |
+| two values at a step end | The test of signs uses the state at the end of a step. The root finder uses the dense \
+output, which differs from this state by rounding. It then finds no change of sign and stops with an error. |
+| dense output | The event time is a zero of the dense output, which is less accurate than the steps. |
+| trial steps | The solver tries a step beyond the domain of the model, and its state or Jacobian is not a number. The \
+solver fails before it searches for the event. |
 
 The picture of a scene shows one state in a time window around the first visible error of a method. The solid line is a
-correct run. The dashed line is a run of the failing method. The legend names this method, and the table names its
-setting. The strip below the curves shows the events of both runs in this window. The number of events of each run is at
-the right edge of the strip. Circles are known exact values. If the error is below 4 % of the motion, a second panel
-shows the error.
+correct run. The dashed line is a run of the failing method. The legend names this method, and the table of the scene
+names its setting. The strip below the curves shows the events of both runs in this window. The number of events of
+each run is at the right edge of the strip. Circles are known exact values. If the error is below 4 % of the range of
+the state in this window, a second panel shows the error.
 """
 _QUESTIONS = {
     "events": "Does a method find each event once, at the right time and in the right order?",
@@ -92,8 +89,8 @@ _QUESTIONS = {
     "sensitivity": "How accurate is a method if the motion amplifies its errors?",
 }
 _FAILURES = (*WRONG, HANG, ERROR)
-_FAILURE = """A failure is a wrong answer, a wrong mode sequence, a hang or an error. A refusal is not a
-failure, nor is a scene that is not run. The [first page of the atlas](index.md) has a table of all methods."""
+_FAILURE = """A failure is a wrong answer, a wrong mode sequence, a hang or an error. A refused scene and a scene
+that is not run do not count as failures. The [first page of the atlas](index.md) explains the methods."""
 _LEAST_ORDER = 0.5  # smallest order that counts as convergence
 _NUMBER = re.compile(r"(?<![\w.])\d+\.\d{9,}(?:e[+-]?\d+)?")
 _DIGITS = 9  # digits of numbers in reasons
@@ -172,7 +169,7 @@ def _overall(result: Atlas) -> str:
 
 
 def _failures(result: Atlas, scenes: Sequence[Scene]) -> tuple[str, list[str]]:
-    """Return the number of test cases without a failure as a sentence, and a table of methods by their failures."""
+    """Return the number of test cases with a failure as a sentence, and a table of methods by their failures."""
     failed = {
         one.name: {scene.name for scene in scenes if result.cells[scene.name, one.name].verdict in _FAILURES}
         for one in result.configurations
@@ -180,9 +177,9 @@ def _failures(result: Atlas, scenes: Sequence[Scene]) -> tuple[str, list[str]]:
     of_number: dict[int, list[str]] = {}
     for name, those in failed.items():
         of_number.setdefault(len(those), []).append(f"`{name}`")
-    harmless = len(scenes) - len(set().union(*failed.values()))
     rows = [f"| {number} | {', '.join(names)} |" for number, names in sorted(of_number.items())]
-    sentence = f"In {harmless} of the {len(scenes)} scenes of this page no method fails."
+    failing = len(set().union(*failed.values()))
+    sentence = f"At least one method fails in {failing} of the {len(scenes)} scenes of this page."
     return sentence, ["| scenes with a failure | methods |", "| --- | --- |", *rows]
 
 
