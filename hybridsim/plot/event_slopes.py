@@ -21,7 +21,7 @@ _MOST = 6  # panels by default
 def event_slopes(
     result: Sensitivities, names: Sequence[str] = (), *, axes: Sequence[Axes] | None = None
 ) -> tuple[Axes, ...]:
-    """Draw the derivatives of the event times of a run over the event times, with a panel for each parameter.
+    """Draw the derivatives of event times against the event times, with a panel for each parameter.
 
     The value at an event is dt/dp: the delay of the event per unit of the parameter or of the initial state.
 

@@ -55,9 +55,8 @@ def _never_stops(model: Model) -> list[Certificate]:
         return []
     s = form.found.system
     text = (
-        f"inside the no-stop boundary (mu N/F0 = {s.slip_force / s.force:.4g}): Den Hartog's formula is "
-        "the steady motion, "
-        "and no other is"
+        f"inside the no-stop boundary (mu N/F0 = {s.slip_force / s.force:.4g}): Den Hartog's formula gives "
+        "the only steady motion"
     )
     return [Certificate(text, NoStop.name, motion, steady_only=True)]
 
@@ -134,7 +133,7 @@ def _at(form: Affine, start: Mapping[str, float]) -> float:
 
 
 def _largest(model: Model, form: Affine, force: str, values: Mapping[str, float]) -> float:
-    """Return an upper bound over all times for the absolute value of an affine form, without the contact's force."""
+    """Return an upper bound of the absolute value of a linear form at all times; the contact's force is left out."""
     steady, swing = form.constant, sum(abs(phasor) for phasor in form.waves.values())
     inputs = {i.name: i for i in model.inputs}
     for name, value in form.linear.items():

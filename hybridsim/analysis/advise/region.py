@@ -114,11 +114,11 @@ def _steps(found: Sweep, ladder_steps: Sequence[LadderStep], tol: float) -> list
             verdict = WHERE_TRIED
         elif not np.isfinite(known).any():
             verdict = NOT_APPLICABLE
-        why = f"adequate at {serves} of {total} points, the simplest at {first}"
+        why = f"adequate at {serves} of {total} points, and the simplest adequate model at {first}"
         if tried < total:
-            why = f"adequate at {serves} of the {tried} points without a simpler adequate model"
+            why = f"adequate at {serves} of the {tried} points at which no simpler model is adequate"
         if stopped_at := int(found["stopped"][done][:, k].sum()):
-            why += f", slower than the full model at {stopped_at} and stopped there"
+            why += f"; stopped at {stopped_at}, because it was slower than the full model"
         steps.append(
             Step(
                 rung.name,

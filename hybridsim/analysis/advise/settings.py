@@ -81,7 +81,7 @@ class Setting:
 
 @dataclass(frozen=True)
 class _Settling:
-    """A run that is long enough to become steady, with the measured interval at the end of the run."""
+    """A run that is long enough to become steady; the quantity is measured at the end of the run."""
 
     question: Question
     span: tuple[float, float]
@@ -155,9 +155,7 @@ def confirmed(one: Setting, finer: Setting, tol: float) -> Setting:
     """Return a fixed-step setting, marked as not adequate if a shorter step is not adequate."""
     if finer.is_adequate or finer.value is None:
         return one
-    why = (
-        f"{finer.title} has the error {finer.error:.2g}, above {tol:g}: the error does not fall with the step"
-    )
+    why = f"{finer.title} has the error {finer.error:.2g}, above {tol:g}: the error does not decrease with the step"
     return replace(one, verdict=NOT_ADEQUATE, why=why)
 
 

@@ -44,7 +44,7 @@ class Errors:
 
     @property
     def wrong_modes(self) -> bool:
-        """Whether the run has modes, and their sequence is wrong."""
+        """Whether the run has modes and their sequence is wrong."""
         return self.sequence is not None and not self.sequence.right
 
 

@@ -113,7 +113,10 @@ def timed_rows(
 
 
 def _predicted(entries: Sequence[Entry], rows: dict[_Run, Row], run: _Run) -> float:
-    """Return the seconds of a run, predicted from two looser settings of its series, or 0 without a prediction."""
+    """Predict the seconds of a run from its last two looser settings; return 0 if fewer than two were run.
+
+    The prediction is infinite if a looser setting was stopped.
+    """
     before = [rows[replace(run, level=level)] for level in range(run.level)]
     done = [(row.setting[1], row.cost) for row in before if row.cost is not None]
     if any(row.status == STOPPED for row in before):

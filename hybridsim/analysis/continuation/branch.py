@@ -190,7 +190,7 @@ def _has_real(point: BranchPoint) -> bool:
 
 
 def _turn(a: BranchPoint, b: BranchPoint, c: BranchPoint) -> float:
-    """Return the extreme of the parameter on the parabola through three points over the arc length."""
+    """Return the extreme value of the parameter near point b, from the parabola through three points of a branch."""
     scale = np.maximum(np.abs(b.orbit.start.values), np.finfo(float).tiny)
     d1 = float(np.linalg.norm((b.orbit.start.values - a.orbit.start.values) / scale))
     d2 = float(np.linalg.norm((c.orbit.start.values - b.orbit.start.values) / scale))

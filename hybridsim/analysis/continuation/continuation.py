@@ -257,7 +257,7 @@ class _Follower:
         return None, _CORRECTIONS
 
     def close(self, orbit: Orbit, value: float) -> _Closing | None:
-        """Return the start of a Newton iteration at an orbit that is already periodic."""
+        """Return the data of Newton's method for an orbit that is already periodic, or None if its run fails."""
         motion = Motion(self.model.with_(**{self.parameter: value}), self.method)
         point = BranchPoint(value, orbit, motion, np.zeros(0), (), self.is_free)
         return self._closing(point, self._unknowns(point))

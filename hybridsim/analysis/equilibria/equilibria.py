@@ -208,7 +208,7 @@ def _farthest(field: Field, x: np.ndarray, i: int, side: float) -> float | None:
 
 
 def _program(field: Field, at: np.ndarray, i: int, side: float) -> tuple[str, np.ndarray] | None:
-    """Solve min side*x_i with f + f_x (x - at) = 0 and g + g_x (x - at) >= 0."""
+    """Minimise side*x_i subject to f + f_x (x - at) = 0 and g + g_x (x - at) >= 0."""
     from scipy.optimize import linprog
 
     f, A, g, G = field(at)

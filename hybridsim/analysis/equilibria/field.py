@@ -45,14 +45,14 @@ class Field:
         return found.values[0, :n], found.slopes[0, :n], found.values[0, n:], found.slopes[0, n:]
 
     def at_sides(self, x: np.ndarray) -> Field:
-        """Return the same equations in the modes that belong to x, such as the side of each corner."""
+        """Return the equations after choosing those modes that follow from the state x, such as sides of corners."""
         if not self.by_state:
             return self
         z = modes_by_state(self.system, self.by_state, 0.0, x, self.p, self.z)
         return self if (z == self.z).all() else Field(self.system, z, self.t, self.by_state)
 
     def borders(self, x: np.ndarray) -> list[tuple[int, int]]:
-        """Return the components with a guard that is zero within rounding, and for each the mode beyond the guard."""
+        """Return pairs of a component whose guard is zero within rounding, and a mode to which this guard may lead."""
         _, _, g, G = self(x)
         rounding = dict(zip(self.guards.tolist(), INSIDE * (np.abs(G) @ self.sizes(x)), strict=True))
         value = dict(zip(self.guards.tolist(), g.tolist(), strict=True))

@@ -47,8 +47,8 @@ def zero_loads(system: System, t: float, x: np.ndarray) -> tuple[str, ...]:
             compared = f", below {_SMALL:g} of its largest value {largest:.4g}" if load and largest else ""
             compared = ", zero within rounding" if load and load <= rounding and not largest else compared
             found.append(
-                f"the normal load of {contact.name} is {load:.4g} at t = {t:g}{compared}, at which the model is "
-                "linearized, and it changes with time: give the model its final load as a constant"
+                f"the normal load of {contact.name} is {load:.4g} at t = {t:g}{compared}. The model is linearized at "
+                "this time, but the load depends on time: give the model its final load as a constant"
             )
     return tuple(found)
 

@@ -20,7 +20,7 @@ _NEUTRAL = 2e-4  # growth per repetition that is allowed, as of a direction in w
 
 
 def grows(period_map: PeriodMap, scale: np.ndarray, multiple: int, direction: np.ndarray) -> bool:
-    """Return whether a disturbance (n,) of a repeating motion grows; if it decays, restore the map.
+    """Return whether a small change of a repeating motion grows; if it does not, put the map back to its start.
 
     After some repetitions the change is in the direction, or in the plane of a complex pair, that shrinks least or
     grows fastest. Three changes in a row then determine the largest multipliers. The motion is followed with and
@@ -54,7 +54,7 @@ def grows(period_map: PeriodMap, scale: np.ndarray, multiple: int, direction: np
 
 
 def _followed(period_map: PeriodMap, start: Any, periods: int) -> tuple[Any, np.ndarray]:
-    """Follow the motion over some periods from a stored start; return the new stored state and the states (n,)."""
+    """Follow the motion over some periods from a snapshot; return a snapshot and the states (n,) at the end."""
     period_map.restore(start)
     for _ in range(periods):
         period_map.advance()
@@ -62,7 +62,7 @@ def _followed(period_map: PeriodMap, start: Any, periods: int) -> tuple[Any, np.
 
 
 def _largest_root(first: np.ndarray, second: np.ndarray, third: np.ndarray) -> float:
-    """Return the largest |z| with z**2 = a z + b, where third = a second + b first is the best fit."""
+    """Return the largest |z| for which z**2 = a z + b; the fit of third = a second + b first gives a and b."""
     unit = np.linalg.norm(second)
     a, b = np.linalg.lstsq(np.column_stack([second, first]) / unit, third / unit, rcond=None)[0]
     return float(np.abs(np.roots([1.0, -a, -b])).max())

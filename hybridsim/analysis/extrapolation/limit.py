@@ -8,7 +8,7 @@ _RCOND = 1e-10  # relative to the largest singular value; smaller ones are round
 
 
 def limit_of(before: np.ndarray, after: np.ndarray, scale: np.ndarray) -> tuple[np.ndarray, float]:
-    """Return the limit (n,) of states before and after k periods, and the expected change over a period at the limit.
+    """Extrapolate states before and after k periods to a limit (n,); also return the change per period expected there.
 
     The limit is the combination of the states after the periods, with weights of sum one, for which the same
     combination of the changes is the smallest. It is exact for a linear map with k - 1 multipliers. Every linear

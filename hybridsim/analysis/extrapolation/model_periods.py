@@ -1,4 +1,4 @@
-"""This module follows an ordinary model from period to period of its forcing, as `settling` does with structures."""
+"""This module defines the map over a forcing period of an ordinary model, which `settling` follows."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class ModelPeriods:
 
     @property
     def changes(self) -> bytes:
-        """The changes of mode of each component over the last period, and the modes at its end, to be compared."""
+        """The mode changes of each component over the last period and its final modes, as bytes for comparison."""
         return b"".join(_sequence(column).tobytes() + b"|" for column in self._last.T)
 
     @property
@@ -83,12 +83,12 @@ class ModelPeriods:
 
 
 def _sequence(modes: np.ndarray) -> np.ndarray:
-    """Return the modes (K,) of a component without repetitions."""
+    """Return the modes (K,) of a component without consecutive repetitions."""
     return modes[np.append(True, modes[1:] != modes[:-1])]
 
 
 def extrapolated(motion: Motion, passings: Passings, period: float, tol: float, periods: int) -> Orbit | None:
-    """Return the orbit on which a motion settles, found within some periods, or None.
+    """Return the orbit on which a motion settles, or None if it does not settle within a number of periods.
 
     A contact that slips less from period to period approaches its place like 1/k. Newton's method cannot find such
     an orbit, because the derivative of the period map is singular there.

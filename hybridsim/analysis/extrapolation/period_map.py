@@ -1,4 +1,4 @@
-"""This module says what a map from period to period has to offer so that `settling` can follow it."""
+"""This module defines the interface of a map over a forcing period, which `settling` follows."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 
 class PeriodMap(Protocol):
-    """The map of the states (n,) at the beginning of a period to those at its end, with the modes in between."""
+    """A map from the states (n,) at the beginning of a period to the states at its end, which also gives the modes."""
 
     period: float
     periods: int  # followed so far
@@ -23,7 +23,7 @@ class PeriodMap(Protocol):
 
     @property
     def changes(self) -> bytes:
-        """The changes of mode of each component over the last period, and the modes at its end, to be compared."""
+        """The mode changes of each component over the last period and its final modes, as bytes for comparison."""
 
     @property
     def slips(self) -> dict[tuple[int, int], int]:

@@ -163,7 +163,7 @@ class Settling:
         self._states, self._fresh = [limit], 0
 
     def _end_trial(self, scale: np.ndarray) -> bool:
-        """Take back the last extrapolation unless the next period changes the states less; return whether it stays."""
+        """Keep the last extrapolation only if the next period confirms it; return whether it was kept."""
         trial, self._trial = self._trial, None
         if trial is None:
             return True

@@ -36,7 +36,7 @@ def first_guesses(unknowns: Mapping[str, Unknown], starts: int) -> list[np.ndarr
 def from_further_guesses(
     search: Search, effort: Effort, noise: Mapping[str, float], *, is_limited: bool
 ) -> tuple[list[OptimizeResult], tuple[str, ...]]:
-    """Return the results of fits that start from further guesses, and a warning if the limit of runs left some out.
+    """Return the results of fits from further guesses, and a warning if the limit on runs excluded some guesses.
 
     is_limited : whether the number of runs is limited. It is not if the first guess has no result.
     """

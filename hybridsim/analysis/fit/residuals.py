@@ -138,7 +138,7 @@ class Residuals:
         return self._points[key]
 
     def _timed_run(self, number: int, values: Mapping[str, float]) -> Solution | None:
-        """Simulate the record of the given number and note the time, or return None if the model is wrong.
+        """Simulate the record with the given number and note the time; return None if the model is invalid.
 
         With some values between the bounds a model may be wrong, such as with a limit of stick below the slip force.
         """

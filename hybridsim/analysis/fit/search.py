@@ -73,7 +73,7 @@ class Search:
 
     def _report(self, weighted: np.ndarray) -> None:
         if self._progress is not None:
-            text = f"residual {math.sqrt(float(np.mean(weighted**2))):.4g} of the noise"
+            text = f"residual {math.sqrt(float(np.mean(weighted**2))):.4g} times the noise"
             self._progress(min(self._done, self._total), self._total, text)
         self._done += 1
 

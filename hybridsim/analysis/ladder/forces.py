@@ -44,7 +44,7 @@ def with_forces(model: Model, forces: Mapping[str, Expression], mode: str, title
 
 
 def _is_copy(contact: Contact, part: Component) -> bool:
-    """Return whether an automaton is one of several copies of a law, whose forces are added."""
+    """Return whether an automaton belongs to one copy of a law with several copies, whose forces are added."""
     number = part.name.removeprefix(f"{contact.name}_")
     return contact.law.copies is not None and number != part.name and number.isdecimal()
 

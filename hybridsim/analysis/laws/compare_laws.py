@@ -111,7 +111,7 @@ def contact_of(model: Model, contact: Any) -> str:
 
 
 def models_under(model: Model, laws: Iterable[Entry], contact: str) -> dict[str, Model]:
-    """Return the model under each law, by different labels."""
+    """Return the model with each of the laws, by a unique label for each law."""
     if not is_row(laws):
         raise cannot_be("laws", laws, _LAWS)
     found: dict[str, Model] = {}

@@ -175,13 +175,14 @@ def lyapunov_exponents(
 
 
 def _held(growth: Growth, t_span: tuple[float, float]) -> Iterator[str]:
-    """Yield a warning for each component that is in stick, or slides, during the last half of the motion."""
+    """Yield a warning for each component that sticks, or slides on a surface, for the last half of the motion."""
     first, last = t_span
     for name, since in growth.held_since.items():
         if since <= 0.5 * (first + last):
             yield (
-                f"{name} stays in mode {growth.holds[name]} from t = {max(since, first):.6g} to the end: there a "
-                "shift of a position neither grows nor decays, and an exponent of 0 does not mean a regular motion"
+                f"{name} stays in mode {growth.holds[name]} from t = {max(since, first):.6g} to the end. In "
+                "this mode a shift of a position neither grows nor decays, so an exponent of 0 does not mean a regular "
+                "motion"
             )
 
 

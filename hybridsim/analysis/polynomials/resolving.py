@@ -203,7 +203,7 @@ def orbit_from(
 def _resolved(
     sample: Sample, intervals: _Intervals, rounding: np.ndarray, required: np.ndarray
 ) -> tuple[list[_Finished], np.ndarray]:
-    """Divide intervals until the required quantities (Q,) are resolved; return these, or a mask of the failures."""
+    """Divide intervals until required quantities (Q,) are resolved; return the intervals, or a mask of failures."""
     count = len(sample.names)
     most = max(
         min(_MAX_INTERVALS, _MAX_VALUES // (POINTS * count)), int(_MAX_PER_STEP * len(intervals.begins))

@@ -159,8 +159,8 @@ def steady_sensitivities(
     near = np.abs(multipliers - 1.0)
     if len(near) and near.min() <= _NEUTRAL:
         raise UsageError(
-            f"the motion has the multiplier {multipliers[np.argmin(near)]:.9g}, which is too close to 1, so it has "
-            "no derivatives with respect to the parameters",
+            f"the motion has the multiplier {multipliers[np.argmin(near)]:.9g}, which is too close to 1, so the motion "
+            "has no derivatives with respect to the parameters",
             remedy="use other parameters, or hs.sensitivities for a run from a fixed start",
         )
     states = (*solution.names, *(q.name for q in system.model.discrete))

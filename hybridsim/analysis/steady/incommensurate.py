@@ -53,7 +53,9 @@ def follow(motion: Motion, longest: float, settle: int, max_periods: int) -> Fol
         unit = np.where(largest > 0.0, largest, 1.0)
         unit = np.concatenate([unit, np.ones(len(matrix) - len(unit))])
         left = float(np.abs(matrix * unit[None, :] / unit[:, None]).max(initial=0.0))
-        growth = f"an initial change is {left:.1e} times as large after {count} slowest periods"
+        growth = (
+            f"an initial change is {left:.1e} times as large after {count} periods of the slowest forcing"
+        )
         if left <= _DIES_OUT:
             return Followed(None, True, count, f"quasi-periodic: {_NO_PERIOD}, and {growth}")
         if count * _LONGER > min(max_periods, _MAX_SLOW_PERIODS):

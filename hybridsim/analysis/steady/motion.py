@@ -66,11 +66,9 @@ class CostsTooMuch(SimulationError):
 
     def __init__(self) -> None:
         super().__init__(
-            "no steady motion was found within the work limit; declare a `duration` of several periods "
-            "in the model, "
-            "pass `period`, a smaller `settle`, a larger `tol` or a stiff integrator such as rodas5p, "
-            "or raise "
-            "`max_periods`, which also raises the limit"
+            "no steady motion was found within the work limit. Declare a `duration` of several periods in the model, "
+            "or pass `period`, a smaller `settle`, a larger `tol`, a stiff integrator such as rodas5p, or a larger "
+            "`max_periods`, which also raises the work limit"
         )
 
 

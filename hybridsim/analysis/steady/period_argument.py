@@ -131,7 +131,7 @@ def _has_plain_time(node: ast.AST) -> bool:
 
 
 def _is_linear(node: ast.expr) -> bool:
-    """Return whether an expression is linear in t as it is written: a sum of terms in which t is a factor once."""
+    """Return whether the form of an expression shows that it is linear in t."""
     match node:
         case ast.BinOp(op=ast.Add() | ast.Sub(), left=left, right=right):
             return _is_linear(left) and _is_linear(right)

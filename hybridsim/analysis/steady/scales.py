@@ -40,7 +40,7 @@ def coupled_sizes(system: System, x: np.ndarray, p: np.ndarray, z: np.ndarray) -
 
 
 def shared_sizes(solution: Solution, since: float) -> np.ndarray:
-    """Return the size (n,) of each state late in a run, or the size that it has with the energy of another one.
+    """Return the size (n,) of each state late in a run, at least the size that the energy of a coupled state causes.
 
     Two states that act on each other exchange energy, at once or over a third state, as two masses at the ends of a
     spring do over their velocities. With equal energies the ratio of their sizes is the square root of the ratio of
@@ -69,7 +69,7 @@ def shared_sizes(solution: Solution, since: float) -> np.ndarray:
 
 
 def _ratios(effects: np.ndarray) -> np.ndarray:
-    """Return the ratio (n, n) of the sizes of two states with equal energies, or zero without mutual effects."""
+    """Return the ratio (n, n) of the sizes of two states at equal energies, or zero if the two do not interact."""
     has_any = (effects > 0.0) | (effects.T > 0.0)
     mutual = np.where(has_any, effects, effects @ effects)
     is_mutual = (mutual > 0.0) & (mutual.T > 0.0)

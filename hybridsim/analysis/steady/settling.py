@@ -134,7 +134,7 @@ def scale_of(solution: Solution, since: float) -> np.ndarray:
 
 
 def forced_scale_of(solution: Solution, since: float) -> np.ndarray:
-    """Return the scale (n + d,) of each state of a forced motion, which is not below a fraction of `shared_sizes`."""
+    """Return the scale (n + d,) of each state of a forced motion; it is at least a fraction of `shared_sizes`."""
     scale, least = scale_of(solution, since), LEAST * shared_sizes(solution, since)
     scale[: len(least)] = np.maximum(scale[: len(least)], least)
     return scale
@@ -209,7 +209,7 @@ def free_passings(
 def _without_events(
     late: Solution, orbit: Orbit, times: np.ndarray, j: int, may_be_passed: np.ndarray
 ) -> tuple[np.ndarray, int]:
-    """Return the times of the passages of an event-free section, and the index of the state that defines the section.
+    """Return the times at which the motion passes a section without events, and the index of the state in the section.
 
     times, j: a first section, which is kept if no event is there. Otherwise the section moves to the middle
     of the longest event-free interval of a period. It becomes a level of the state that moves fastest there,

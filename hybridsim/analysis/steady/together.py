@@ -31,7 +31,7 @@ class Effort(NamedTuple):
 
 
 def effort_of(options: Mapping[str, Any]) -> Effort | None:
-    """Return the settings of a search among the options of `steady_state`, or None if a setting is not valid."""
+    """Read the settings of a search from the options of `steady_state`; return None if a setting is not valid."""
     effort = Effort(**{name: options[name] for name in Effort._fields if name in options})
     counts = (effort.settle, effort.max_periods)
     is_valid = isinstance(effort.tol, float) and 0.0 < effort.tol < 1.0

@@ -46,7 +46,7 @@ def forcing_period_of(system: MechanicalSystem) -> float:
 
 
 class PeriodMap:
-    """The map of the states (2n,) at the beginning of a period to those at its end, at phase zero of the forcing.
+    """The map of the states (2n,) over one period of the forcing, which begins and ends at phase zero.
 
     States are in the order of the arrays of `MechanicalRun`: positions, then velocities. The modes of the
     contacts are carried from period to period. natural, masses: see `natural_sizes` and `masses_of`.

@@ -61,7 +61,7 @@ class StructureSteadyState(SteadyState):
 
     @property
     def start(self) -> dict[str, float]:
-        """The states at the beginning of the period, by name, as ``x0`` of another search."""
+        """The states at the beginning of the period, by name; another search accepts them as ``x0``."""
         first = self._run.states(np.array([self._run.t_start]), "+")[0]
         return dict(zip(self._run.names, first.tolist(), strict=True))
 

@@ -13,7 +13,7 @@ FLOOR = 1e-3  # smallest scale of a state, relative to the largest scale of its 
 
 
 def natural_sizes(system: MechanicalSystem, built: Built, period: float) -> np.ndarray:
-    """Return the sizes (2n,) of positions and velocities that the forces cause without contacts, in order.
+    """Return the sizes (2n,) that positions and velocities would have under the same forces without contacts.
 
     A force f on a mass m with stiffness k and damping c causes a displacement of about f / (m w^2 + c w + k) at
     the angular frequency w of the period. Coupling is ignored, but no size is below the floor of `with_floor`.

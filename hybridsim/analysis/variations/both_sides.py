@@ -39,7 +39,7 @@ class OneSide:
         return _shift(self._carried, number)
 
     def own_sizes(self) -> np.ndarray:
-        """Return, for each direction, how large a change must be to alter some quantity by its own size."""
+        """Return, for each direction, the smallest step that changes a state or constant by its own size."""
         found: np.ndarray = self._carrier.own_sizes(self._directions)
         return found
 
@@ -49,7 +49,7 @@ class OneSide:
 
 
 class BothSides(OneSide):
-    """Derivatives of a run, with NaN if the derivatives on the two sides of a guard or surface at zero differ.
+    """Derivatives of a run; they are NaN if they differ on the two sides of a guard or surface that is exactly zero.
 
     Each direction that moves a function off its zero is carried forward and backward, on its own side.
     """

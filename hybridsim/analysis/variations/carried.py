@@ -197,7 +197,7 @@ class Carrier:
         return np.concatenate([self._scale, np.where(discrete > 0.0, discrete, 1.0)])[:, None]
 
     def own_sizes(self, directions: Directions) -> np.ndarray:
-        """Return, for each direction, how large a change must be to alter some quantity by its own size."""
+        """Return, for each direction, the smallest step that changes a state or constant by its own size."""
         system = self.system
         constants = np.abs(np.concatenate([system.discrete_start, self._vector.constants()]))
         scale = np.concatenate([self._scale, np.where(constants > 0.0, constants, 1.0)])

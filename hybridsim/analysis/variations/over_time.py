@@ -89,7 +89,7 @@ class OverTime:
     def moving(
         self, name: str, number: int, s: float, is_after: bool, shift: np.ndarray | None
     ) -> np.ndarray:
-        """Return the derivatives (M,) of a quantity at a point of a segment whose time changes by `shift` (M,)."""
+        """Return the derivatives (M,) of a quantity at a point, whose time has the derivatives `shift` (M,)."""
         system, segment = self.solution._system, self.solution._segments[number]
         stops = np.array([s])
         Y = self._sides.within(number, stops, is_after)
@@ -105,7 +105,7 @@ class OverTime:
         return self._sides.shift(number)
 
     def own_sizes(self) -> np.ndarray:
-        """Return, for each direction, how large a change must be to alter some quantity by its own size."""
+        """Return, for each direction, the smallest step that changes a state or constant by its own size."""
         return self._sides.own_sizes()
 
     def at_end(self) -> np.ndarray:

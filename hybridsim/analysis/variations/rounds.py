@@ -94,7 +94,7 @@ class Rounds:
         self._run(happened, segment.p, float(segment.s[-1]), float(segment.origin))
 
     def at_appointment(self, instant: Instant, happened: Sequence[Occurrence]) -> None:
-        """Apply the resets of scheduled events; an input with a knot at this instant uses its coefficients after it."""
+        """Apply the resets of scheduled events, with the values that inputs have just after this instant."""
         self._run(happened, self.system.vector(instant, self.d), 0.0, float(instant))
 
     def _run(self, happened: Sequence[Occurrence], p: np.ndarray, s: float, origin: float) -> None:

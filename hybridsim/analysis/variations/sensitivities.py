@@ -154,7 +154,7 @@ class Sensitivities(Readable):
         return ReadingDerivatives(title, value, slopes[:starts], slopes[starts:])
 
     def plot(self, *names: str) -> Any:
-        """Draw the derivatives of the event times, dt/dp, over the event times; see `hybridsim.plot.event_slopes`.
+        """Draw the derivatives dt/dp of the event times against the event times; see `hybridsim.plot.event_slopes`.
 
         The names are parameters, or states for the initial values; by default the first six parameters. It returns the
         axes; ``hybridsim.plot.save`` writes them to a file. A run without events, or an unknown name, raises

@@ -66,7 +66,7 @@ NumberedSlopes = Callable[[np.ndarray, np.ndarray], np.ndarray]
 """The type of derivatives (m, n, n + q) in segments with given numbers (m,) at local times (m,)."""
 
 Slopes = Callable[[np.ndarray], np.ndarray]
-"""The type of derivatives (m, n, n + q) of the rates at local times (m,), by n states and q constants."""
+"""The type of derivatives (m, n, n + q) of the rates at local times (m,) with respect to n states and q constants."""
 
 
 class Intervals(NamedTuple):

@@ -1,4 +1,4 @@
-"""This module stores the instruction tapes that compute derivatives of formulas, once for all runs of one structure."""
+"""This module stores instruction tapes that compute derivatives of formulas; models with one structure share them."""
 
 from __future__ import annotations
 

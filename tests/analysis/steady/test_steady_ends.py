@@ -22,7 +22,7 @@ def test_a_search_that_costs_too_much_ends(monkeypatch: pytest.MonkeyPatch) -> N
     module = import_module("hybridsim.analysis.steady.steady_state")
     monkeypatch.setattr(module, "_TIME_BUDGET", 0.01)
     found = hs.steady_state(slow_and_fast())
-    assert found.kind == "not settled" and "declare a `duration`" in found.message
+    assert found.kind == "not settled" and "Declare a `duration`" in found.message
 
 
 @pytest.mark.parametrize("name", ["settle", "max_periods"])

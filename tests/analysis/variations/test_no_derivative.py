@@ -35,7 +35,7 @@ def test_a_run_that_stays_where_its_rate_has_no_derivative_is_refused_by_name(
     rate: str, function: str
 ) -> None:
     """At rest at x = 0 these rates have the slopes infinity, or +1 and -1."""
-    message = rf"the rate of x has no derivative by x.*{function}"
+    message = rf"the rate of x has no derivative with respect to x.*{function}"
     with pytest.raises(hs.UsageError, match=message) as caught:
         hs.sensitivities(run({"x": (0.0, rate)}, p=0.7), [])
     assert "(x = 0)" in str(caught.value)
@@ -53,7 +53,7 @@ def test_a_rate_that_is_flat_at_rest_has_the_derivative_zero(rate: str) -> None:
 def test_a_cone_is_refused_at_its_tip_and_right_beside_it() -> None:
     """For resting x and y, z gains r = sqrt(x**2 + y**2) in unit time, with dr/dx = x/r."""
     rates = {"x": (0.0, "0"), "y": (0.0, "0"), "z": (0.0, "sqrt(x**2 + y**2)")}
-    with pytest.raises(hs.UsageError, match=r"the rate of z has no derivative by x and y"):
+    with pytest.raises(hs.UsageError, match=r"the rate of z has no derivative with respect to x and y"):
         hs.sensitivities(run(rates))
     beside = hs.sensitivities(run(rates | {"x": (0.3, "0"), "y": (0.4, "0")}))
     assert np.allclose(beside.by_start[2], [0.6, 0.8, 1.0], rtol=1e-12)

@@ -21,7 +21,7 @@ _LOOK = 0.1  # seconds between checks of the threads, for progress and Ctrl-C
 
 
 class Points(Protocol):
-    """The protocol of the points of a sweep, numbered in C order of a shape."""
+    """The protocol of the points of a sweep, which have numbers in the C order of `shape`."""
 
     @property
     def shape(self) -> tuple[int, ...]:

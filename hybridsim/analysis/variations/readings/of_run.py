@@ -154,8 +154,8 @@ class Readings:
             if is_limit and shift.any():
                 by = " and ".join(np.array(self._changes)[shift != 0.0])
                 raise UsageError(
-                    f"{extremes.name} has its extreme value at an event at t = {self._time(place):.9g}, which is an "
-                    f"end of the time span; a change of {by} moves this event, so the extreme value has no "
+                    f"the extreme value of {extremes.name} is at t = {self._time(place):.9g}, where an event coincides "
+                    f"with an end of the time span; a change of {by} moves the event, so the extreme value has no "
                     "derivative",
                     remedy=self._remedy or "use a part of the run that ends earlier or later, t_span=(a, b)",
                 )
@@ -215,8 +215,8 @@ class Readings:
             if t in (self._low, self._high):
                 by = " and ".join(np.array(self._changes)[shift != 0.0])
                 raise UsageError(
-                    f"{' * '.join(names)} jumps at t = {t:.9g}, which is an end of the time span; a change of {by} "
-                    "moves this jump, so the integral has no derivative",
+                    f"{' * '.join(names)} jumps at t = {t:.9g}, exactly at an end of the time span; a change of {by} "
+                    "moves the jump, so the integral has no derivative",
                     remedy=self._remedy or "use a part of the run that ends earlier or later, t_span=(a, b)",
                 )
             total += jump * shift

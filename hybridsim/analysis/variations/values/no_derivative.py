@@ -32,7 +32,8 @@ def no_derivative(
         * bool(found)
     )
     return UsageError(
-        f"at t = {t:.9g} ({at}) {title} has no derivative by {' and '.join(by)}{cause}", remedy=_REMEDY
+        f"at t = {t:.9g} ({at}) {title} has no derivative with respect to {' and '.join(by)}{cause}",
+        remedy=_REMEDY,
     )
 
 

@@ -76,7 +76,7 @@ def _derivative(expression: Expression, name: str, values: Mapping[str, float]) 
     if np.isnan(value):
         raise UsageError(
             f"{expression.text} has no derivative with respect to {name} at {name} = {values[name]:.6g}",
-            remedy=f"do not request derivatives by {name}, or use another value",
+            remedy=f"leave out the derivatives with respect to {name}, or use another value of {name}",
         )
     return value
 

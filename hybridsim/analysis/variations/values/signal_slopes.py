@@ -72,7 +72,7 @@ class SignalSlopes:
         return np.zeros(self.width)
 
     def _corner(self, t: float) -> tuple[float, float, float]:
-        """Return the corner of a wave at time t: its fraction of the period, its value and the slope after it."""
+        """Return the corner of a wave nearest to time t: fraction of the period, value, and slope after it."""
         periods = (t - self._value["phase"]) / self._value["period"]
         return min(self.signal.corners, key=lambda corner: abs(math.remainder(periods - corner[0], 1.0)))
 

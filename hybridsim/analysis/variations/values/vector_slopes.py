@@ -65,7 +65,7 @@ class VectorSlopes:
         ]
 
     def of(self, p: np.ndarray) -> np.ndarray:
-        """Return the derivatives (size of p, d + P + V) of a run-time vector."""
+        """Return the derivatives (size of p, d + P + V) of the run-time vector p with respect to all constants."""
         n = self.system.n
         return self.seeds(p)[n + 1 :, n + 1 :]
 
@@ -116,7 +116,7 @@ class VectorSlopes:
         return found
 
     def knots(self, t: Instant) -> list[tuple[str, np.ndarray]]:
-        """Return the inputs with a knot at an instant, within rounding, and the derivatives (P + V,) of its time."""
+        """Return the inputs with a knot at an instant, within rounding, with the derivatives (P + V,) of the time."""
         slack = 4.0 * math.ulp(float(t))
         found = []
         for one in self._signals:
