@@ -186,7 +186,7 @@ def test_what_jumps_with_a_state_in_a_velocity_is_refused_and_the_remedy_works()
     states = (("x", 0.0, "v"), ("v", 1.0, "-f"))
     with pytest.raises(hs.HybridsimError, match=r"'1 if x < 2 else 0\.2' jumps in guard velocity") as refused:
         hs.simulate(model(*states, contacts=[contact]), (0.0, 4.0))
-    assert "which a monitor of 'x - 2'" in refused.value.remedy
+    assert "reset it by a monitor of 'x - 2'" in refused.value.remedy
     over = hs.Monitor("over", "x - 2", direction="up", action="reset", reset={"belt": 0.2})
     held = hs.Contact("f", "v - belt", 10, "coulomb", {"mu": 0.1})
     built = model(*states, contacts=[held], discrete=[hs.Discrete("belt", 1)], monitors=[over])

@@ -87,7 +87,7 @@ def check_identifier(scope: Scope, part: Declared, kind: str, name: object) -> b
         scope.fail(
             part,
             f"{kind} '{name}': the name is reserved",
-            "functions, pi, t (time) and keysegments of Python are reserved",
+            "functions, pi, t (time) and keywords of Python are reserved",
         )
         return False
     return True

@@ -118,7 +118,7 @@ def _has_bare_number(node: ast.expr, definitions: Mapping[str, ast.expr]) -> boo
 
 
 def time_unit(model: Model) -> str:
-    """Return the time unit in the units of the model: "s", or else "min" or "h" if only one of them occurs, or ""."""
+    """Return "s" if it occurs in the units of the model, else "min" or "h" if only one of the two occurs, else ""."""
     units = [*units_of(model).values(), *(parameter.unit for parameter in model.parameters)]
     symbols = {symbol for unit in units for symbol in re.findall(r"[A-Za-z]+", unit)}
     found = [time for time in ("s", "min", "h") if time in symbols]

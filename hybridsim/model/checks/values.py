@@ -133,7 +133,7 @@ def _schedule(findings: Findings, schedule: Schedule, values: dict[str, float]) 
 
 
 def _definition(findings: Findings, part: tuple[str, Expression], values: dict[str, float]) -> None:
-    """Add the value of a definition that depends on parameters only to the values."""
+    """Store the value of a definition in `values` if the definition depends on parameters only."""
     name, expr = part
     value = _value(findings, expr, values) if expr.names <= values.keys() else None
     if value is not None:

@@ -23,7 +23,7 @@ Definition = tuple[str, Expression]
 
 
 def without_directions(components: Iterable[Component], definitions: Iterable[Definition]) -> dict[str, Any]:
-    """Return the components without directions of guards, and all definitions, including the added definitions.
+    """Replace the directions of guards by automata; return the components, and all definitions with the added ones.
 
     Each component is followed by the automata of its guards.
     """

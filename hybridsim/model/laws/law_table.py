@@ -226,11 +226,11 @@ class LawTable(Declared):
         return (self.over.text == "v" or "v" not in first) and not any("v" in names for names in second)
 
     def row_names(self, name: str) -> list[str]:
-        """Return the variables with the values at each number in `at`, for a table of two arguments."""
+        """Return one variable name for each row of a table of two arguments, and no name for a table of one."""
         return [f"{name}_{k}" for k in range(1, len(self.at) + 1)] if self.across is not None else []
 
     def _named(self, name: str) -> dict[str, Expression]:
-        """Return the values at each number in `at` by names, unless all of them are numbers."""
+        """Return the values by name as expressions; a table of one argument that contains only numbers has none."""
         if self.across is not None:
             return {row: parse(row) for row in self.row_names(name)}
         if not any(self.expressions()):

@@ -58,7 +58,7 @@ def sides_of_product(meanings: Meanings, node: ast.expr, left: Set[Family] = fro
 
 
 def rooted_in(meanings: Meanings, node: ast.expr) -> frozenset[Family]:
-    """Return each sign in a continuous product if the sign's argument and a root of the product vanish together.
+    """Return the signs of a continuous product that jump at a point where a root in the product is zero.
 
     An example is sign(d)*sqrt(abs(d)), which has no Taylor series at d = 0 on either side.
     """

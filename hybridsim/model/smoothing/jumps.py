@@ -98,7 +98,7 @@ class Borders:
         if names & self._changed:
             return f"a mode changes the rate of {min(names & self._changed)}"
         if names & self._of_gaps:
-            return f"an impact also holds {min(names & self._of_gaps)}"
+            return f"a closed gap constrains {min(names & self._of_gaps)}"
         if names & self._moving or (TIME in names and not names & self._held):
             return ""
         return "the compared expression may stay at zero, since neither time nor a changing state moves it"

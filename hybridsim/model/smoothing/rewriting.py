@@ -245,8 +245,8 @@ class Rewriting(RewritingState):
             )
         else:
             remedy = (
-                f"use a discrete state instead, which a monitor of '{border}' or a transition at its sign change "
-                "resets"
+                f"use a discrete state instead, and reset it by a monitor of '{border}', or by a transition where "
+                f"'{border}' changes its sign"
             )
         return ModelError(
             f"'{write(node)}' jumps in {here.where}, but a mode must hold this expression at zero",

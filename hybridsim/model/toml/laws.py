@@ -94,7 +94,7 @@ def _packaged(name: str) -> FrictionLaw | None:
 
 
 def _of_file(table: Table, folder: Path) -> FrictionLaw | None:
-    """Return the law in the file that a contact refers to, or None after reporting its errors."""
+    """Return the law from the file that a contact names, or None after reporting the errors of the file."""
     from hybridsim.model.library import law_of_text, read_text
 
     for key in _OWN:

@@ -1,4 +1,4 @@
-"""This module converts measured times to seconds, the only values that are converted from one unit to another."""
+"""This module converts measured times to seconds; no other values are converted between units."""
 
 from __future__ import annotations
 

@@ -92,7 +92,7 @@ def _rate(known: Quantities, what: str, expr: Expression, name: str) -> Statemen
 
 
 def _unless(known: Quantities, expr: Expression, kinds: Sequence[Unit]) -> Unit | None:
-    """Return a required unit if an expression has the dimension of none of the required units, otherwise None."""
+    """Return the first of some required units, or None if the expression has the dimension of one of them."""
     unit = known.inference().unit(expr.tree)
     is_one = unit is None or any(unit.dimension == kind.dimension for kind in kinds)
     return None if is_one else kinds[0]

@@ -29,7 +29,7 @@ FAULTS = {
     "an open table": ("[states\n", "invalid TOML", "[states]"),
     "a name twice": ('[states]\nx = { start = 1, der = "0" }\nx = 2\n', "invalid TOML", "a second time"),
     "a table twice": ("[states]\n[states]\n", "invalid TOML", "a second time"),
-    "an open list": ("x = [1, 2", "invalid TOML", "close the list with ]"),
+    "an open list": ("x = [1, 2", "invalid TOML", "close a list with ]"),
     "an open text": ('x = "abc\n', "invalid TOML", "close the text"),
     "two in a line": ("x = 1 y = 2", "invalid TOML", "one key = value in a line"),
     "no quotes": ("x = -k", "invalid TOML", "double quotes"),
