@@ -184,25 +184,23 @@ def page(
         "# Does the advice name the right model?",
         "",
         "Does `advise` name the simplest adequate model? Its answer differs from a search through all "
-        f"models at **{len(wrong) + len(near) + len(dear)}** of {count} random points. At {len(near)} of "
-        "these points an error is so close to the tolerance (0.01 %) that the difference is doubtful. At "
-        f"{len(dear)} points `advise` had stopped an adequate model, because the model takes far more time "
-        "than the full model.",
+        f"models at **{len(wrong) + len(near) + len(dear)}** of {count} random points.",
         "",
-        f"`python docs/studies/advice.py` draws {count} points in a map of the reference model. F0/N is in "
-        "[0.5, 1.5] and r in [0.05, 2]. For each point `advise` names the simplest model whose steady "
-        f"amplitude of x is within {100 * TOL:g} %. The script then finds this model again by a search "
-        "through all models, called brute force:",
+        f"`python docs/studies/advice.py` draws {count} points in a map of the reference model `dfcs`. "
+        "The ratio F0/N of forcing to normal load is between 0.5 and 1.5. The ratio r of the forcing "
+        "frequency to the natural frequency is between 0.05 and 2. For each point `advise` names the "
+        f"simplest model whose steady amplitude of x is within {100 * TOL:g} %. The script then searches for "
+        "this model by brute force, with a run of every model:",
         "",
         "- The full motion is computed in closed form, from rest until the free vibration has decayed.",
         "- Formulas give the amplitude of the models without friction and with equivalent viscous damping.",
-        "- The regularized models are run over the same time.",
+        "- The regularized models are simulated over the same time.",
         "",
-        "A model with a friction force smoothed over 1 % of the speed is stiff near the threshold of "
-        f"motion. At {stopped} points `advise` stopped such a model. The amplitudes of the full model by "
-        f"`advise` and by brute force differ by at most {worst:.1e}. By brute force, the amplitudes of "
-        f"successive periods differ by at most {drift:.1e}. On one thread `advise` took {spent:.0f} s, and "
-        f"brute force {brute:.0f} s.",
+        "If friction is smoothed over 1 % of the speed, the model is stiff near the threshold of motion. At "
+        f"{stopped} points `advise` stopped the run of such a model, because it took too long. The "
+        f"amplitudes of the full model by `advise` and by brute force differ by at most {worst:.1e}. In the "
+        f"closed form, the amplitudes of the last two periods differ by at most {drift:.1e}. On one thread "
+        f"`advise` took {spent:.0f} s, and brute force {brute:.0f} s.",
         "",
         "| simplest within 1 % | points |",
         "| --- | --- |",
@@ -211,9 +209,14 @@ def page(
     if wrong:
         lines += ["", "## Points that differ", *head, *wrong]
     if dear:
-        lines += ["", "## Points with an adequate model that was too expensive", *head, *dear]
+        lines += ["", "## Points with an adequate model that was too expensive", ""]
+        lines += [
+            "At these points `advise` had stopped the run of an adequate model, because it took far longer"
+        ]
+        lines += ["than a run of the full model.", *head, *dear]
     if near:
-        lines += ["", "## Points with an error at the tolerance", *head, *near]
+        lines += ["", "## Points with an error at the tolerance", ""]
+        lines += ["At these points an error differs from the tolerance by at most 0.01 % of it.", *head, *near]
     lines += [
         "",
         "## The map",
@@ -223,10 +226,10 @@ def page(
         "(../images/advice-map.png)",
         "",
         "*The map shows the answers of `advise` on a grid with N = 40 N. Below F0 = 20 N nothing moves. For "
-        "motions with stops, the simplest adequate model is usually Karnopp's, with a v0 of 1 % of the "
-        "largest speed. At some frequencies it is the form tanh or arctan with this v0. These models take "
-        "at least as much time as the full model. For motions without stops, Den Hartog's formula is exact. "
-        "Near resonance equivalent viscous damping is adequate.*",
+        "motions with stops, the simplest adequate model is usually Karnopp's with a v0 of 1 % of the "
+        "largest speed. At some frequencies the simplest adequate model is the one with tanh or arctan and "
+        "this v0. Runs of these models take at least as long as runs of the full model. For motions without "
+        "stops, Den Hartog's formula is exact. Near resonance equivalent viscous damping is adequate.*",
         "",
     ]
     return "\n".join(lines)
