@@ -186,8 +186,8 @@ amplitude is {ends[0] / peaks[best]:.1f} times as large. With a damper that alwa
         ends[1]
         / peaks[
             best
-        ]:.1f} times as large. With a load below the best one, the damper dissipates almost nothing. With a
-        load above it, the damper sticks, and only makes the blade stiffer.
+        ]:.1f} times as large. With a very small load, the damper dissipates almost nothing. With a very
+large load, the damper sticks, and only makes the blade stiffer.
 
 The model `models/blade-damper.toml` is one mode of the blade with a Jenkins element (Griffin 1980,
 [doi:10.1115/1.3230256](https://doi.org/10.1115/1.3230256)). `python docs/studies/blade_damper.py` runs one `hs.sweep`
@@ -202,19 +202,19 @@ over N. For each load the script finds the largest amplitude over the frequency.
 ## Checks
 
 - **No normal load.** The peak of the blade alone is F0/(c omega_d) = {1e3 * ends[0]:.6f} mm, with omega_d =
-  sqrt(k_b/m - (c/2m)^2). At N = {loads[0]:g} N the sweep differs from this peak by a relative {
-        off[0]:.2e}. The reason is the
-  light damper, which decreases the peak by 4 mu N/(pi F0) = {light:.2e}.
+  sqrt(k_b/m - (c/2m)^2). At N = {loads[0]:g} N the relative difference of the sweep from this peak is {
+        off[0]:.2e}. The
+  reason is friction in the damper, which decreases the peak by the share 4 mu N/(pi F0) = {light:.2e}.
 - **Damper that always sticks.** With the stiffness k_b + k_d the peak of the amplitude is {
         1e3 * ends[1]:.6f} mm.
-  At N = {loads[-1]:g} N the sweep differs from this peak by a relative {off[1]:.1e}.
-- **Work.** For any motion with two reversals per period, the loop of the force f over x is a parallelogram of area
-  4 mu N (A - mu N/k_d). At all loads at which the damper slips, the integrated work differs from this area by at
-  most {work:.1e}.
+  At N = {loads[-1]:g} N the relative difference of the sweep from this peak is {off[1]:.1e}.
+- **Work.** For any motion with the amplitude A and two reversals per period, the loop of the force f over x is a
+  parallelogram. Its area is 4 mu N (A - mu N/k_d). At all loads at which the damper slips, the integrated work differs
+  from this area by at most {work:.1e}.
 - **First harmonic.** Assume x = A cos(theta) at resonance. The forcing then does the work pi F0 A per cycle. The
-  losses are pi c omega A^2 + 4 mu N (A - mu N/k_d). For c = 0 and with P = mu N, this balance gives A = 4 P^2/(k_d (4
-  P - pi F0)). The smallest amplitude is **A = pi F0/k_d** = {
-        1e3 * math.pi * blade.force / blade.kd:.4f} mm at **N =
+  damping c and the damper dissipate pi c omega A^2 + 4 mu N (A - mu N/k_d). The work and the losses are equal. For
+  c = 0 and with P = mu N, this equation gives A = 4 P^2/(k_d (4 P - pi F0)). The smallest amplitude is
+  **A = pi F0/k_d** = {1e3 * math.pi * blade.force / blade.kd:.4f} mm at **N =
   pi F0/(2 mu)** = {loads[formula]:.2f} N, with the stiffness k_b + k_d/2. With the damping c (line in the
   picture) the smallest amplitude is {
         1e3 * harmonic[formula]:.4f} mm. In the sweep the smallest amplitude is {
