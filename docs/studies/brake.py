@@ -166,12 +166,12 @@ along and across the belt. Friction couples the two motions, because the normal 
 belt. The coefficient of friction is constant, so the squeal is not caused by friction that decreases with the
 speed. The script `python docs/studies/brake.py` finds the onset in three ways:
 
-- **Closed form.** While the block slides, lambda^2 + c lambda + 2 = +-sqrt(1 - 4 mu/3). Up to mu = 3/4 both motions
-  decay with the rate c/2. At mu = 3/4 their frequencies are equal. For a larger mu one of the motions grows,
-  if c is small enough. At the onset lambda = i sqrt(2).
+- **Closed form.** While the block slides, the eigenvalues lambda of the motion satisfy lambda^2 + c lambda + 2 =
+  +-sqrt(1 - 4 mu/3). Up to mu = 3/4 both motions decay with the rate c/2. At mu = 3/4 their frequencies are equal. For
+  a larger mu one of the motions grows if c is small enough. At the onset of growth, one eigenvalue is i sqrt(2).
 - **Linearization.** `hs.linearize` in the mode `slip-` gives the coefficient at which its `growth` is zero.
 - **Simulation.** The run starts {SHAKE:g} away from steady sliding, and lasts {WATCHED:g} units of time without an
-  event. A matrix maps the states at one time to the states {STEP:g} later. It is fitted to the run (dynamic mode
+  event. The script fits a matrix that maps the states at one time to the states {STEP:g} later (dynamic mode
   decomposition, Schmid 2010, [doi:10.1017/S0022112010001217](https://doi.org/10.1017/S0022112010001217)). The largest
   eigenvalue of the matrix gives the growth.
 
@@ -179,9 +179,9 @@ speed. The script `python docs/studies/brake.py` finds the onset in three ways:
 | --- | --- | --- | --- | --- | --- |
 {table}
 
-The last two columns are the largest differences from the closed form, between mu = {FRICTION[0]:g} and
-{FRICTION[-1]:g}. The differences are largest at mu = 3/4, where two eigenvalues are equal. Equal eigenvalues
-change with the square root of a change of the matrix.
+The last two columns are the largest differences from the closed form between mu = {FRICTION[0]:g} and
+{FRICTION[-1]:g}. The differences are largest at mu = 3/4. Two eigenvalues are equal there, so a small error of the
+matrix changes them by its square root.
 
 ![Growth of a small disturbance, and the final amplitude, over the coefficient of friction](../images/brake.png)
 
@@ -191,10 +191,11 @@ The next table is for the damping c = {SQUEALING:g}.
 | --- | --- | --- | --- | --- | --- |
 {shown}
 
-The simulation also gives the final motion. At mu = {FRICTION[squeals][0]:.2f} and above, the disturbance grows
+The simulation also gives the final motion. At mu = {FRICTION[squeals][0]:.2f} and above, a small disturbance grows
 until the block sticks to the belt in every cycle. Just above the onset the final amplitude is already
 {sizes[SHAKE][squeals][0]:.2f}. A disturbance of {LARGE:g} is larger than the amplitude of the limit cycle. After
-such a disturbance the motion settles to the limit cycle too. Below the onset even such a disturbance causes no squeal.
+such a disturbance the motion settles to the limit cycle too. Below the onset even this large disturbance causes no
+squeal.
 """
 
 
