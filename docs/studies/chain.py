@@ -123,23 +123,26 @@ def page(rows: dict[int, dict[str, tuple[float, float, float]]], load: float) ->
     verdict = ""
     if HAS_HEYOKA:
         verdict = f"""
-hybridsim is faster than heyoka for n = {ahead or "none"}{but}. heyoka expands the series of the whole chain at every
-event. heyoka compiles its code for this chain, and the table does not include the time for this. The event
-callbacks of heyoka are Python functions. The kernels of hybridsim are compiled once for all systems.
+hybridsim is faster than heyoka for n = {ahead or "none"}{but}. The program heyoka expands the series of the whole
+chain at every event. The code of heyoka is compiled for this chain. The table does not include the time of this
+compilation. The event callbacks of heyoka are Python functions. The kernels of hybridsim are compiled once for all
+systems.
 """
     heads = " | ".join(names)
     return f"""# A chain of blocks: what an event costs
 
 How does the cost of an event grow with the number of blocks n? In hybridsim the time per event grows as
-n^{exponent:.2f}. This time includes a share of the time of the steps.
+n^{exponent:.2f}. The time per event is the time of a run divided by its number of events. Therefore it
+includes the steps between the events.
 
-`hs.chain_on_belt(n)` is a chain of blocks of mass 1 on a belt of speed {BELT}. The leaf springs have a stiffness of
-{LEAF}, and the coupling springs of {COUPLING}. The friction is 1/(1 + {DELTA:g}|v|), and the initial positions are
-random. `python docs/studies/chain.py` runs the methods in turns, and takes the shortest time of each method. Every run
-finished. {machine()}
+`hs.chain_on_belt(n)` is a chain of blocks of mass 1 on a belt of speed {BELT}. A leaf spring holds each block,
+and a coupling spring joins neighbouring blocks. The leaf springs have a stiffness of {LEAF}, and the coupling springs
+of {COUPLING}. The friction force at the slip velocity v is 1/(1 + {DELTA:g}|v|), and the initial positions are random.
+`python docs/studies/chain.py` runs the methods in turn several times. The table contains the shortest time of each
+method. Every run finished. {machine()}
 
-When the study began, other programs kept {load:.1f} of {os.cpu_count()} processors busy. All times are longer for
-this reason, and ratios of times are uncertain by a factor of two.
+When the study began, other programs used {load:.1f} of {os.cpu_count()} processors. These programs made all times
+longer. Ratios of times are uncertain by a factor of two.
 
 The table gives milliseconds per unit of simulated time. The number in brackets is the largest error of a state after
 {JUDGED:g} units of time. The reference is a run of hybridsim at rtol 1e-13.
@@ -155,7 +158,7 @@ tolerance. At the end of a step it expands the series of all blocks, once for al
 methods restart all blocks at each event. For these methods the cost of an event is therefore proportional to n.
 {verdict} hybridsim and heyoka control their error. RK4 with h = {STEP:g} has no error control. When RK4 releases a
 block, it changes the speed of the block by 1e-14, so that the block does not stop again at once. The program siconos
-was not run. PyPI has no wheel of siconos (`pip download siconos` finds no version).
+was not run, because PyPI has no wheel of siconos (`pip download siconos` finds no version).
 """
 
 
