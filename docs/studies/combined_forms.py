@@ -142,42 +142,42 @@ def pairs(seeds: list[int]) -> tuple[Counter[str], Counter[tuple[str, str]]]:
 
 HEAD = """# Combined forms
 
-Do runs of models that combine many forms agree with an independent judge? Of {runs} runs {agree} agree and {differ}
-differ. The tables below list the other runs.
+Do runs of models with many combined features agree with an independent solver? Of {runs} runs {agree} agree and
+{differ} differ. The tables below list the other runs.
 
 `python docs/studies/combined_forms.py` draws whole models at random. It compares each run with an independent solver,
-the judge, that shares no code with hybridsim. The models combine these forms:
+which shares no code with hybridsim. On this page this solver is called *the judge*. A *form* is an element of a
+model, such as an impact, or a way to write an expression. The models combine these forms:
 
 - Every number is a literal, a parameter, an expression of parameters, a definition, a discrete state or an input.
 - Guards, loads, gaps, laws, rates, monitors and resets contain `max`, `min`, `abs` and conditionals. Each of these
   functions is written in one of several equivalent ways.
-- Forces, loads and speeds of belts change at known times. The changes are single conditions, Boolean combinations,
-  tables and waves.
-- Runs start on guards, at rest and on corners. Schedules, clocks, impacts, contacts, relays and monitors have
-  events at the same instant.
-- Parts of a model depend on states of other parts. A definition may replace a part of an expression.
+- Forces, loads and speeds of belts change at known times. These changes are written as single conditions, Boolean
+  combinations of conditions, tables or waves.
+- Runs start on guards, at rest and on corners. Schedules, clocks, impacts, contacts, relays and monitors have events
+  at the same instant.
+- Parts of a model depend on states of other parts. Some expressions use a definition.
 - Names, the order of declaration, the scale and sign of states, and the origin of time are also random. One run in
   ten is stopped in the middle and resumed.
 
-Each model with a set of numbers runs by two integrators. One is an integrator of hybridsim or the default, and the
-other is drawn at random. The first structures are selected so that no pair of forms is rare. Each of them is the
-best of {pool} random structures. The best one contains the most pairs that are in fewer than {enough} structures so
-far. The other structures are not selected. All pairs of forms are possible, because every form belongs to a part of
-a model, and parts are drawn independently.
+A *structure* is a random model without its numbers. Each structure gets several random sets of numbers. Each set of
+numbers runs with two integrators. The first is an integrator of hybridsim or the default, and the second is drawn at
+random. The first structures are selected so that no pair of forms is rare. Each of them is the best of {pool} random
+structures. The best structure has the most pairs of forms that are still in fewer than {enough} structures. The later
+structures are not selected. Parts of a model are drawn independently, so all pairs of forms are possible.
 
-*The judge* (`tests/reference/combined`) reads an abstract form of the model, and not the model file. It computes
-the motion by Taylor series for each combination of modes. It finds zeros by dense sampling and bisection. At an
-instant with an event it tries every combination of modes and sides. A combination is admissible if its conditions
-are true just after the instant. The judge also finds impulses by trying all combinations. If a run disagrees, the
-judge computes the motion again in 40 digits. A run is compared only as long as the motion is certain. The
-comparison ends if a guard approaches zero within 1e-6 and turns back. The comparison also ends at an instant at
-which the rules permit several motions.
+*The judge* (`tests/reference/combined`) reads an abstract form of the model, and not the model file. The judge
+computes the motion by Taylor series for each combination of modes. It finds zeros by dense sampling and bisection. At
+an instant with an event it tries every combination of modes and of branches of `abs`, `min`, `max` and conditionals.
+A combination is admissible if its conditions are true just after the instant. The judge also finds impulses by trying
+all combinations. If a run disagrees, the judge computes the motion again in 40 digits. A run is compared only as long
+as the motion is certain. The comparison ends in two cases. In the first case a guard comes closer to zero than 1e-6
+and turns back. In the second case the rules permit several motions.
 
-A run *agrees* if two conditions are met. First, all states and discrete states are compared at {points} times. They
-differ from those of the judge by at most {allowed:g} of the size of the motion. Second, all monitors fire as often
-as with the judge. Two other kinds of runs are counted separately. A run of the first kind stops with a named status
-before the motion of the judge ends. A run of the second kind is wrong, but warns that a jump was integrated as it
-is written.
+A run *agrees* if two conditions are met. First, at {points} times all states and discrete states differ from those of
+the judge by at most {allowed:g} of the size of the motion. Second, all monitors fire as often as with the judge. Two
+other kinds of runs are counted separately. Some runs stop with a named status before the motion of the judge ends.
+Other runs are wrong, but warn that hybridsim integrated a jump without locating it.
 
 """
 
@@ -200,9 +200,9 @@ def page(done: list[dict[str, Any]], draws: int) -> str:
         differ=kinds["differs"],
     )
     instants = sum(r.get("instants", 0) for r in runs)
-    counts = f"There are {len(seeds)} structures with {draws} sets of numbers each, and each set runs by two "
-    counts += "integrators. Some of these runs have no model or no certain motion. The others are "
-    counts += f"{len(runs)} runs, with {instants} instants of events."
+    counts = f"There are {len(seeds)} structures with {draws} sets of numbers each. Each set runs with two "
+    counts += "integrators. Some sets of numbers give no valid model, or no motion that is certain. There "
+    counts += f"remain {len(runs)} runs, with {instants} instants of events."
     out += textwrap.fill(counts, 118) + "\n\n"
     out += "| result | runs |\n| --- | --- |\n"
     out += "".join(f"| {kind} | {count} |\n" for kind, count in kinds.most_common())
