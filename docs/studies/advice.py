@@ -216,7 +216,11 @@ def page(
         lines += ["than a run of the full model.", *head, *dear]
     if near:
         lines += ["", "## Points with an error at the tolerance", ""]
-        lines += ["At these points an error differs from the tolerance by at most 0.01 % of it.", *head, *near]
+        lines += [
+            "At these points an error differs from the tolerance by at most 0.01 % of it.",
+            *head,
+            *near,
+        ]
     lines += [
         "",
         "## The map",
