@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from hybridsim.engine.events.zeno.limits import LIMIT
+from hybridsim.engine.record.event_block import EventBlock
+from hybridsim.engine.record.segments import Occurrence
 from hybridsim.errors import UsageError
 from hybridsim.solution.solution import Solution
 
@@ -28,25 +31,38 @@ def refuse(solution: Solution) -> None:
 def _refuse_limits(solution: Solution) -> None:
     """Raise an error for a run in which accumulating events were not resolved down to rounding errors."""
     components = {component.name: component for component in solution.components}
+    is_reserved = any(
+        guard.name == LIMIT
+        for component in solution.components
+        for mode in component.modes
+        for guard in mode.guards
+    )
     before = solution.t_start
-    for event in solution.events:
-        if event.kind != "transition":
+    for block in solution._of_model.record.occurrences.blocks:
+        if isinstance(block, EventBlock) and not is_reserved:  # an accumulation is never in such a block
+            instants, _ = block.transitions(0)
+            before = max(before, float(instants[-1].sum())) if len(instants) else before
             continue
-        component = components[event.component]
-        names = [guard.name for guard in component.mode(event.source).guards]
-        if event.guard == LIMIT and LIMIT in names and component.limit:
-            raise UsageError(
-                f"the guard {LIMIT} of {event.component} has a name that is reserved for accumulations "
-                f"of events, so the guard cannot be distinguished from the accumulation at t = {event.t:.9g}",
-                remedy="rename the guard",
-            )
-        if event.guard == LIMIT and LIMIT not in names:
-            if event.t - before > _ROUNDINGS * math.ulp(event.t):
-                raise UsageError(
-                    f"events accumulate at t = {event.t:.9g} and were not resolved to rounding error, so the "
-                    "run has "
-                    "no derivatives",
-                    remedy="use finite differences between runs",
-                )
-        elif event.t > before:
-            before = event.t
+        for one in block:
+            if one.kind == "transition":
+                before = max(before, _refuse_limit(one, components[one.component], before))
+
+
+def _refuse_limit(one: Occurrence, component: Any, before: float) -> float:
+    """Raise an error for an accumulation that was not resolved, and return the time of any other event."""
+    names = [guard.name for guard in component.mode(one.source).guards]
+    t = float(one.instant)
+    if one.guard != LIMIT:
+        return t
+    if LIMIT in names and component.limit:
+        raise UsageError(
+            f"the guard {LIMIT} of {one.component} has a name that is reserved for accumulations "
+            f"of events, so the guard cannot be distinguished from the accumulation at t = {t:.9g}",
+            remedy="rename the guard",
+        )
+    if LIMIT not in names and t - before > _ROUNDINGS * math.ulp(t):
+        raise UsageError(
+            f"events accumulate at t = {t:.9g} and were not resolved to rounding error, so the run has no derivatives",
+            remedy="use finite differences between runs",
+        )
+    return t if LIMIT in names else before
