@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from hybridsim.errors import Place
@@ -18,7 +18,7 @@ from hybridsim.model.parts.component import Component, Mode
 from hybridsim.model.parts.model import Model
 from hybridsim.model.smoothing.explicit_corners import smoothing_of
 from hybridsim.model.smoothing.nonsmooth import JUMPS, UNCHANGED, uses_primitives
-from hybridsim.model.smoothing.one_sided import names_of, never_negative, number_of
+from hybridsim.model.smoothing.one_sided import Lookup, never_negative, number_of, reached_names
 from hybridsim.model.units.faults import unit_faults
 
 
@@ -31,9 +31,10 @@ def warnings_of(model: Model) -> tuple[Caution, ...]:
     form of the expressions and their values at the start. Guards of contacts and surfaces, which the program creates,
     are not checked.
     """
+    functions = tuple(_event_functions(model))
     return (
-        *_of_signs(model),
-        *_of_units(model),
+        *_of_signs(functions),
+        *_of_units(model, functions),
         *unit_faults(model),
         *_of_pulses(model),
         *jumps_of(model),
@@ -63,23 +64,51 @@ def jumps_of(model: Model) -> tuple[Caution, ...]:
     return found
 
 
+class _Flow:
+    """What moves the states of a model: facts that the readings of all its modes share."""
+
+    def __init__(self, model: Model) -> None:
+        self.model, self.components = model, model.all_components()
+        self.numbers = model.parameter_values()
+        self.trees = {name: expr.tree for name, expr in model.definitions}
+        # for each state, the rates that modes declare, each with its component
+        self.rates: dict[str, list[tuple[Component, Expression]]] = {}
+        for component in self.components:
+            for mode in component.modes:
+                for name, rate in mode.der.items():
+                    self.rates.setdefault(name, []).append((component, rate))
+        self._known: dict[Expression, tuple[bool, set[str]]] = {}
+
+    def moves(self, rate: Expression, variables: Mapping[str, Expression], lookup: Lookup) -> bool:
+        """Return whether a rate is not zero in a mode with these variables."""
+        known = self._known.get(rate)
+        if known is None:
+            is_moving = number_of(rate.tree, self.numbers, self.trees.get) != 0
+            known = self._known[rate] = is_moving, reached_names(rate.tree, self.trees.get)
+        if known[1].isdisjoint(variables):
+            return known[0]
+        return number_of(rate.tree, self.numbers, lookup) != 0
+
+    def changing_outside(self, own: Component | None) -> set[str]:
+        """Return the names that can change without a motion of the states, while a mode of a component is active."""
+        found = {TIME, *(signal.name for signal in self.model.inputs)}
+        found |= {name for other in self.components if other is not own for name in other.variables}
+        return found | _reset_names(self.model, own)
+
+
 class _Reading:
     """The definitions and variables in one mode of a component, and the quantities that vary."""
 
-    def __init__(self, model: Model, component: Component | None = None, mode: Mode | None = None) -> None:
-        self.numbers = model.parameter_values()
-        self._trees = {name: expr.tree for name, expr in model.definitions}
-        self._trees |= {name: expr.tree for name, expr in (mode.set if mode else {}).items()}
-        others = [part for part in model.all_components() if part is not component]
-        self._moving = {TIME, *(signal.name for signal in model.inputs)}
-        self._moving |= {name for other in others for name in other.variables}
-        if mode is None:
-            self._moving |= set(model.variables())
-        self._moving |= _reset_names(model, component)
-        for state in model.states:
+    def __init__(
+        self, flow: _Flow, outside: set[str], component: Component | None, mode: Mode | None
+    ) -> None:
+        self.numbers, variables = flow.numbers, dict(mode.set) if mode else {}
+        self._trees = flow.trees | {name: expr.tree for name, expr in variables.items()}
+        self._moving = set(outside)
+        for state in flow.model.states:
             own = mode.der.get(state.name, state.der) if mode else state.der
-            rates = [own, *(m.der[state.name] for o in others for m in o.modes if state.name in m.der)]
-            if any(number_of(rate.tree, self.numbers, self.lookup) != 0 for rate in rates):
+            others = (rate for owner, rate in flow.rates.get(state.name, ()) if owner is not component)
+            if any(flow.moves(rate, variables, self.lookup) for rate in (own, *others)):
                 self._moving.add(state.name)
 
     def lookup(self, name: str) -> ast.expr | None:
@@ -88,16 +117,7 @@ class _Reading:
 
     def changes(self, expr: Expression) -> bool:
         """Return whether the value of an expression can change while a mode is active."""
-        open_, seen = set(names_of(expr.tree)), set()
-        while open_:
-            name = open_.pop()
-            seen.add(name)
-            if name in self._moving:
-                return True
-            tree = self.lookup(name)
-            if tree is not None:
-                open_ |= names_of(tree) - seen
-        return False
+        return not self._moving.isdisjoint(reached_names(expr.tree, self.lookup))
 
     def one_sided(self, expr: Expression) -> tuple[str, str] | None:
         """Return the sign that an expression cannot have ("negative" or "positive"), and the reason."""
@@ -131,23 +151,25 @@ class _EventFunction:
 
 
 def _event_functions(model: Model) -> Iterator[_EventFunction]:
+    flow = _Flow(model)
     for component in model.components:
+        outside = flow.changing_outside(component)
         for mode in component.modes:
-            reading = _Reading(model, component, mode)
+            reading = _Reading(flow, outside, component, mode)
             for guard in mode.guards:
                 what = (
                     f"guard {guard.name} of mode {mode.name}, component {component.name}: '{guard.expr.text}'"
                 )
                 yield _EventFunction(what, guard.expr, guard.expr.place or guard.place, reading, True)
-    reading = _Reading(model)
+    reading = _Reading(flow, flow.changing_outside(None), None, None)
     for monitor in model.monitors:
         what = f"monitor {monitor.name}: '{monitor.expr.text}'"
         yield _EventFunction(what, monitor.expr, monitor.expr.place or monitor.place, reading, False)
 
 
-def _of_signs(model: Model) -> Iterator[Caution]:
+def _of_signs(functions: Sequence[_EventFunction]) -> Iterator[Caution]:
     """Yield warnings about guards and monitors that are constant or have only one sign."""
-    for item in _event_functions(model):
+    for item in functions:
         meant = "at the end of the mode" if item.is_guard else "at the event"
         remedy = f"write an expression that changes its sign {meant}"
         if not item.reading.changes(item.expr):
@@ -160,7 +182,7 @@ def _of_signs(model: Model) -> Iterator[Caution]:
             yield Caution(f"{item.what} is {reason}, never {sign}, so it {fires}", item.place, remedy)
 
 
-def _of_units(model: Model) -> Iterator[Caution]:
+def _of_units(model: Model, functions: Sequence[_EventFunction]) -> Iterator[Caution]:
     """Yield warnings about guards and monitors without units in a model whose other states have units.
 
     Discrete states are left out: they count, as often as not.
@@ -168,9 +190,9 @@ def _of_units(model: Model) -> Iterator[Caution]:
     units = {state.name: state.unit for state in model.states}
     units |= {parameter.name: parameter.unit for parameter in model.parameters}
     units |= {part.name: part.unit or "1" for part in model.discrete}
-    functions = [(item, _quantities(item.expr, item.reading, units)) for item in _event_functions(model)]
-    bare = [(item, names) for item, names in functions if names and not any(units[name] for name in names)]
-    measured = [item for item, names in functions if any(units[name] for name in names)]
+    read = [(item, units.keys() & reached_names(item.expr.tree, item.reading.lookup)) for item in functions]
+    bare = [(item, names) for item, names in read if names and not any(units[name] for name in names)]
+    measured = [item for item, names in read if any(units[name] for name in names)]
     named = {name for _, names in bare for name in names}
     others = [state for state in model.states if state.name not in named]
     if not (measured or len(bare) == 1) or not others or not all(state.unit for state in others):
@@ -184,20 +206,8 @@ def _of_units(model: Model) -> Iterator[Caution]:
         )
 
 
-def _quantities(expr: Expression, reading: _Reading, units: Mapping[str, str]) -> set[str]:
-    """Return the states, discrete states and parameters that an expression depends on."""
-    open_, seen = set(names_of(expr.tree)), set()
-    while open_:
-        name = open_.pop()
-        seen.add(name)
-        tree = reading.lookup(name)
-        if tree is not None:
-            open_ |= names_of(tree) - seen
-    return seen & units.keys()
-
-
 def _of_pulses(model: Model) -> Iterator[Caution]:
-    lookup = _Reading(model).lookup
+    lookup = {name: expr.tree for name, expr in model.definitions}.get
     found: set[str] = set()
     for what, expr in _followed(model):
         pulse = pulse_in(expr.tree, lookup)

@@ -21,23 +21,53 @@ def starting_facts(model: Model) -> tuple[str, ...]:
     if model.flow is not None:
         return ()
     meanings = Meanings(model)
-    starts = (line for component in model.all_components() for line in _starts(model, component, meanings))
+    start = _Start(model, meanings)
+    starts = (line for component in model.all_components() for line in _starts(model, component, start))
     return (*starts, *_loads(model, meanings))
 
 
-def _starts(model: Model, component: Component, meanings: Meanings) -> Iterator[str]:
+class _Start:
+    """The values of a model at the start."""
+
+    def __init__(self, model: Model, meanings: Meanings) -> None:
+        self.meanings = meanings
+        self.starts = model.start_values() | model.discrete_values()
+        self.values = {**model.parameter_values(), **self.starts, TIME: 0.0}
+        self.trees = {state.name: state.start.tree for state in model.states}
+        self.trees |= {discrete.name: discrete.start.tree for discrete in model.discrete}
+
+    def value(self, expr: Expression) -> float | None:
+        """Return the value of an expression at the start, or None if the value is undefined."""
+        return number_of(self.meanings.written_out(expr.tree), self.values, self.meanings.lookup)
+
+    def is_zero(self, expr: Expression) -> bool:
+        """Return whether an expression is zero at the start within rounding errors."""
+        tree = self.meanings.written_out(expr.tree)
+        value = number_of(tree, self.values, self.meanings.lookup)
+        if value is None:
+            return False
+        bound = rounding_of(of_tree(with_names(tree, self.trees)), self.values)
+        for name in names_of(tree) & self.starts.keys():
+            start = self.starts[name]
+            if start != round(start):
+                moved = number_of(tree, self.values | {name: start * (1.0 + _ULP)}, self.meanings.lookup)
+                bound += 0.0 if moved is None else abs(moved - value)
+        return abs(value) <= bound
+
+
+def _starts(model: Model, component: Component, start: _Start) -> Iterator[str]:
     """Yield sentences about a component if one of its guards or its surface is zero at the start."""
     name, surface = component.name, component.surface
     if isinstance(component, Corner):
         return
     if surface is not None and surface.is_unilateral:
-        gap = _value_at_start(model, surface.function, meanings)
-        if gap is not None and gap < 0.0 and not _is_zero_at_start(model, surface.function, meanings):
+        gap = start.value(surface.function)
+        if gap is not None and gap < 0.0 and not start.is_zero(surface.function):
             yield (
                 f"the gap of impact {name} ({surface.function.text}) is {gap:.6g} at the start: the body begins beyond "
                 "its stop"
             )
-    if surface is not None and _is_zero_at_start(model, surface.function, meanings):
+    if surface is not None and start.is_zero(surface.function):
         text = surface.function.text
         if surface.is_unilateral:
             yield (
@@ -56,36 +86,11 @@ def _starts(model: Model, component: Component, meanings: Meanings) -> Iterator[
             )
     if surface is None and component.initial:
         for guard in component.mode(component.initial).guards:
-            if _is_zero_at_start(model, guard.expr, meanings):
+            if start.is_zero(guard.expr):
                 yield (
                     f"guard {guard.name} of mode {component.initial}, component {name} ({guard.expr.text}) is zero at "
                     "the start: its first nonzero time derivative decides whether it fires immediately"
                 )
-
-
-def _value_at_start(model: Model, expr: Expression, meanings: Meanings) -> float | None:
-    """Return the value of an expression at the start, or None if the value is undefined."""
-    starts = model.start_values() | model.discrete_values()
-    values = {**model.parameter_values(), **starts, TIME: 0.0}
-    return number_of(meanings.written_out(expr.tree), values, meanings.lookup)
-
-
-def _is_zero_at_start(model: Model, expr: Expression, meanings: Meanings) -> bool:
-    """Return whether an expression is zero at the start within rounding errors."""
-    starts = model.start_values() | model.discrete_values()
-    values = {**model.parameter_values(), **starts, TIME: 0.0}
-    tree = meanings.written_out(expr.tree)
-    value = number_of(tree, values, meanings.lookup)
-    if value is None:
-        return False
-    trees = {state.name: state.start.tree for state in model.states}
-    trees |= {discrete.name: discrete.start.tree for discrete in model.discrete}
-    bound = rounding_of(of_tree(with_names(tree, trees)), values)
-    for name in names_of(tree) & starts.keys():
-        if starts[name] != round(starts[name]):
-            moved = number_of(tree, values | {name: starts[name] * (1.0 + _ULP)}, meanings.lookup)
-            bound += 0.0 if moved is None else abs(moved - value)
-    return abs(value) <= bound
 
 
 def _loads(model: Model, meanings: Meanings) -> Iterator[str]:

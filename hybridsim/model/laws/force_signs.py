@@ -10,7 +10,7 @@ from hybridsim.expr.grammar import TIME
 from hybridsim.model.laws.law import LOAD_RATE, NORMAL, SPEED
 from hybridsim.model.parts.contact import Contact
 from hybridsim.model.parts.model import Model
-from hybridsim.model.smoothing.one_sided import number_of
+from hybridsim.model.smoothing.one_sided import number_of, reached_names
 
 # test speeds relative to the nominal velocity; a warning requires a wrong sign at all of them
 _SPEEDS = (
@@ -48,7 +48,10 @@ def wrong_reactions(model: Model) -> Iterator[tuple[Contact, str, str]]:
         return 0.0 if None in ends else ends[1] - ends[0]  # type: ignore[operator]  # neither is None
 
     for contact in model.contacts:
+        moving = reached_names(contact.velocity.tree, trees.get)
         for state in model.states:
+            if state.name not in moving or contact.name not in reached_names(state.der.tree, trees.get):
+                continue  # one of the slopes is zero
             if slope(contact.velocity, state.name) * slope(state.der, contact.name) > 0.0:
                 yield (
                     contact,

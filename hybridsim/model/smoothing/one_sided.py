@@ -88,6 +88,18 @@ def number_of(node: ast.expr, numbers: Mapping[str, float], lookup: Lookup) -> f
         return None
 
 
+def reached_names(node: ast.expr, lookup: Lookup) -> set[str]:
+    """Return the names in an expression, and those in the definitions and variables that it reaches."""
+    open_, seen = set(names_of(node)), set[str]()
+    while open_:
+        name = open_.pop()
+        seen.add(name)
+        tree = lookup(name)
+        if tree is not None:
+            open_ |= names_of(tree) - seen
+    return seen
+
+
 def names_of(node: ast.AST) -> frozenset[str]:
     """Return the names of quantities in a tree, without functions and constants; the result is cached."""
     found: frozenset[str] | None = getattr(node, "names_of", None)
