@@ -168,7 +168,7 @@ def project(model: Any, work: Any, state: Any, s: float, x: Any) -> None:
 
 @inlined
 def put_sides(state: Any, own: Any) -> None:
-    """Set the side of each guard to its side at the start of the segment."""
+    """Set the sign of each guard to its sign at the start of the segment."""
     put(state.sides, own.sides)
     put(state.orders, own.orders)
     put(state.floors, own.floors)

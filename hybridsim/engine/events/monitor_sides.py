@@ -83,6 +83,6 @@ class MonitorSides:
         return -before
 
     def restore_hidden_sides(self, outcome: Outcome) -> None:
-        """Restore the sides of monitors for which rounding hides whether their functions are zero."""
+        """Restore the signs of monitors for which rounding hides whether their functions are zero."""
         hidden = self.is_open & (outcome.monitor_sides == 0)
         outcome.monitor_sides[hidden] = self.before[hidden]

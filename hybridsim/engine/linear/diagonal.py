@@ -1,4 +1,4 @@
-"""This module tests in compiled code whether eigenvectors are a good basis, and writes the modes in that basis."""
+"""This module tests in compiled code whether eigenvectors are a good basis, and writes the diagonal form."""
 
 from __future__ import annotations
 
@@ -143,7 +143,7 @@ def check_eigenvectors(values: Any, vectors: Any, inverses: Any, horizon: float,
 
 @kernel
 def write_diagonal(values: Any, vectors: Any, inverses: Any, exponent: int, found: Any, out: Any) -> None:
-    """Write one block for each eigenvalue of the diagonal matrices to `out`."""
+    """Write the diagonal form of each matrix that has a good basis of eigenvectors, with one block per eigenvalue."""
     counts, scales, chosen = found.counts, found.scales, found.is_diagonal
     for k in range(values.shape[0]):
         out.counts[k] = counts[k]

@@ -71,7 +71,7 @@ def _turn(
 
 @inlined
 def _bend(lin: Any, k: int, i: int, v: Any, is_shrinking: bool) -> tuple[float, float]:
-    """Return bounds of a state and its third derivative up to the next node."""
+    """Return bounds of the absolute values of a state and of its third derivative up to the next node."""
     size = bend = 0.0
     for j in range(lin.counts[k]):
         b = abs(lin.basis[k, i, j])

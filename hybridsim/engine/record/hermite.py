@@ -86,7 +86,7 @@ def fit_in_time(left: Any, right: Any, h: float, shift: Any, inverse: Any, lack:
 
 @cache
 def middle_weights(count: int) -> np.ndarray:
-    """Return the weights of the derivatives at one end in the value and the slope at the middle of a step.
+    """Return the weights with which the derivatives at one end enter the value and the slope at mid-step.
 
     The terms of the right series, with theta backward from there, have the same weights, with opposite signs in the
     slope.

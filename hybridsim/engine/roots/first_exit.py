@@ -160,7 +160,7 @@ def change_of_sign(b: Any) -> float:
 
 @polynomial_kernel
 def _expanded(a: Any, order: int, theta: float) -> tuple[float, float, float]:
-    """Omit the first `order` coefficients of a polynomial, and return its value, its slope and half its curvature.
+    """Return value, slope and half the curvature of a polynomial, divided by theta**order, at theta.
 
     With q = theta**2 they are E(q) + theta O(q): the even and odd powers are independent sums.
     """

@@ -124,7 +124,7 @@ class SegmentEnd(NamedTuple):
 
 @inlined
 def not_followed(outcome: int) -> SegmentEnd:
-    """Return the result of a segment kernel that has followed no segment."""
+    """Return the result of a segment kernel that has integrated nothing."""
     return SegmentEnd(outcome, 0.0, -1, 0, 0.0, 0.0, 0.0, 0.0, 0.0, False)
 
 

@@ -95,7 +95,7 @@ def _in_order(hits: list[Hit]) -> tuple[Hit, ...]:
 
 
 class Locator:
-    """Searches the steps of one segment for zeros, and stores the side of each guard and monitor."""
+    """Searches the steps of one segment for zeros, and stores the sign of each guard and monitor."""
 
     def __init__(self, flow: Flow, watch: Watch) -> None:
         self.flow = flow

@@ -219,7 +219,7 @@ def _is_near(series: Any, arrival: Arrival, guard: int, s: float) -> bool:
 
 
 def _before_instant(series: Any, arrival: Arrival, segment: SegmentRun) -> np.ndarray:
-    """Return the sides of the monitors just before an instant; monitors at zero have not yet crossed.
+    """Return the signs of the monitors just before an instant; monitors at zero have not yet crossed.
 
     If a crossing of such a monitor was recorded, it is removed. The sides before and after the instant decide.
     """

@@ -302,13 +302,13 @@ class SegmentRun:
         return min(stops, key=lambda stop: stop[0].theta, default=None)
 
     def _remember_monitors(self, found: Findings, theta: float) -> None:
-        """Store the sides of the monitors just before a stop."""
+        """Store the signs of the monitors just before the event that stops the segment."""
         for hit in found.crossings:
             if hit.theta < theta:
                 self.locator.monitor_sides[hit.number] = hit.direction
 
     def _at_step_end(self, step: Step, found: Findings) -> tuple[Step, Arrival | None]:
-        """Set the sides of guards and monitors for the next step; a zero at the end of a step belongs to that step.
+        """Set the signs of guards and monitors for the next step; a zero at the end of a step belongs to that step.
 
         A guard that the search left undecided and that is negative beyond rounding at the end was zero before it.
         """

@@ -118,7 +118,7 @@ def optimised(
 def _sorted_rows(
     rows: Any, apart: Any, kind: Any, same: Any, constant_rows: Any, series_rows: Any
 ) -> tuple[int, int]:
-    """Sort rows by constants and series, drop rows that only copy, and return how many there are of each.
+    """Separate rows of constants from rows of series, omit copies, and return the number of rows of each kind.
 
     apart: separate registers of values that are constant in these modes. kind, same: dependence on time, and the
     register in place of each copied register; both are updated.

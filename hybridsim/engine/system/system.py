@@ -419,7 +419,7 @@ class System(_Frame):
         return out
 
     def _probing(self, p: np.ndarray) -> np.ndarray:
-        """Return a copy of the run-time values in which errors of user functions are not reported."""
+        """Return a copy of the run-time values for trial calls, in which errors of user functions are not reported."""
         p = p.copy()
         p[self.layout.pin_at] = 0.0
         return p

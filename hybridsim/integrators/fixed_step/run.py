@@ -42,7 +42,7 @@ ROWS = 8192  # most steps per kernel call; each call has a new time origin, so t
 
 
 def _left(before: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """Return a mask of the monitors that leave their side in a step, by `leaves_side`."""
+    """Return a mask of the monitors that become zero or change their sign in a step, by `leaves_side`."""
     return ((before > 0.0) & (after <= 0.0)) | ((before < 0.0) & (after >= 0.0))
 
 

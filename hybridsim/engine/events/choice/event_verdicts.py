@@ -65,7 +65,7 @@ class EventVerdicts(EventData):
         return int(_verdict(self.automata, None, 0, self.judged(z), z, members, continuous, True, 0))
 
     def is_continuous(self, z: np.ndarray, components: Iterable[int]) -> bool:
-        """Return whether the mode changes of this event, up to the modes `z`, leave all unknowns continuous."""
+        """Return whether all unknowns stay continuous if this event ends in the modes `z`."""
         if self.jumped:
             return False
         members, event = np.array(list(components), dtype=np.int64), self.event()

@@ -24,7 +24,7 @@ _is_below_limit = Precompiled(is_below_limit)
 
 
 def below_limits(resolution: EventVerdicts, members: list[int]) -> np.ndarray:
-    """Return a mask of the contacts certainly below their limits; a contact alone in its cluster is not tested."""
+    """Return a mask of the contacts that are certainly below their limits; a single component is not tested."""
     automata, at = resolution.system.automata, resolution.at
     modes, keeps = np.maximum(at.z, 0), np.zeros(len(members), dtype=np.bool_)
     holding = [

@@ -204,7 +204,7 @@ class Accumulation:
         )
 
     def reach(self, now: float) -> float:
-        """Return the time span in which rounding errors do not hide accumulating events."""
+        """Return the longest time span for the next segment in which rounding does not hide accumulating events."""
         if not self.is_under_way(now):
             return math.inf
         return min(
@@ -247,7 +247,7 @@ class Accumulation:
         return None
 
     def _paced(self, instants: np.ndarray, owners: np.ndarray, component: int) -> tuple[bool, Pace]:
-        """Update the intervals of a component with new events; return also whether its accumulation may end."""
+        """Return whether the events of a component may have reached their limit, and its updated intervals."""
         pace = self.paces.get(component, BEGINNING)
         known = np.array(pace.intervals) if pace.intervals else _NO_INTERVALS
         at, work, last = (
