@@ -68,7 +68,7 @@ class Entry:
 
 
 def entries(system: System, z: np.ndarray) -> tuple[Entry, ...]:
-    """Return the declared transitions without resets that lead into the present modes."""
+    """Return the declared transitions into the present modes that have no reset."""
     found = []
     for c, automaton in enumerate(system.automata):
         if automaton.has_surface or automaton.is_corner:

@@ -44,7 +44,7 @@ def leave_out(A: Any, guards: Any, n: int, usable: Any) -> None:
 
 @kernel
 def write_bases(A: Any, n: int, flows: Any, inverse: Any, states: Any, spreads: Any, slopes: Any) -> None:
-    """Write the matrices that convert between modal coordinates and states, and the rates of the states.
+    """Write the matrices that convert states to modal coordinates, modal coordinates to states, and states to rates.
 
     flows: `hybridsim.engine.linear.modal.Modals`. The other arrays are described in `hybridsim.engine.linear.tables`
     and are zero.

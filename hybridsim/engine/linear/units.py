@@ -17,7 +17,7 @@ from hybridsim.engine.system.known_times import START
 
 @lru_cache(64)
 def horizon_class(horizon: float) -> float:
-    """Return the order of magnitude of a segment length, for which tables are computed."""
+    """Round a segment length up to a power of 16; tables are computed for this length."""
     return 16.0 ** math.ceil(math.log(horizon, 16.0)) if horizon > 0.0 else math.inf
 
 

@@ -123,7 +123,7 @@ class Emitter:
         return [line for item in items for line in self._item(item)]
 
     def _item(self, item: Item) -> list[str]:
-        """Return the lines of code of a program item, which are written once for all functions."""
+        """Return the lines of code of a program item; they are made once and used in all functions."""
         if id(item) not in self._lines:  # the program keeps its items
             self._lines[id(item)] = self._new_lines(item)
         return self._lines[id(item)]

@@ -18,7 +18,7 @@ from hybridsim.expr.simplify import simplified
 
 
 class StopCoupling(NamedTuple):
-    """A gap of a unilateral contact and a friction contact along the gap, by their component numbers."""
+    """The numbers of two components: a gap, and a friction contact whose velocity is proportional to the gap's rate."""
 
     gap: int
     along: int

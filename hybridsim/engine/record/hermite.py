@@ -163,7 +163,7 @@ def fit_all(steps: Any, ends: Any, shift: Any, inverse: Any, out: Any) -> None:
 def _evaluate(
     c: np.ndarray, s0: float, s1: float, left: np.ndarray, right: np.ndarray, s: np.ndarray
 ) -> np.ndarray:
-    """Return the states (k, n) at local times (k,), which are exact at both ends."""
+    """Return the states (k, n) at local times (k,); they are exact at both ends of the step."""
     n, size = c.shape
     out = np.empty((s.shape[0], n))
     for m in range(s.shape[0]):

@@ -160,7 +160,7 @@ def change_of_sign(b: Any) -> float:
 
 @polynomial_kernel
 def _expanded(a: Any, order: int, theta: float) -> tuple[float, float, float]:
-    """Return value, slope and half the curvature of a polynomial, divided by theta**order, at theta.
+    """Return value, slope and half the curvature, at theta, of the polynomial with the coefficients a[order:].
 
     With q = theta**2 they are E(q) + theta O(q): the even and odd powers are independent sums.
     """

@@ -104,7 +104,7 @@ def where_it_ends(u: Any, kind: int, order: int, h: float, a: Any, stack: Any, c
 
 @kernel
 def where_a_root_ends(u: Any, order: int, h: float, a: Any, stack: Any, code: int) -> float:
-    """Return the longest safe step for sqrt(u), which ends before u comes close to zero and rises again."""
+    """Return the longest safe step for sqrt(u): it ends before u comes close to zero and rises again."""
     change, _, _ = _sizes(u, order, h)
     high, low = _FAR_SHARE * u[0], _NEAR_SHARE * u[0]
     if not (u[0] > 0.0 and u[0] - change < low):

@@ -131,7 +131,7 @@ class MethodKernels(ABC):
         return None
 
     def count(self, counters: Counters, steps: int, result: Any) -> None:
-        """Add the cost of the steps, without the number of steps, to the counters."""
+        """Add the cost of the steps to the counters; the number of steps is counted elsewhere."""
         return
 
     def take(self, result: Any) -> None:

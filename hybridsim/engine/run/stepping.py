@@ -46,7 +46,7 @@ class Step:
 
 @dataclass(frozen=True)
 class Watch:
-    """The active guards and all monitors of one segment, with their signs and the orders of their zeros at the start."""
+    """The active guards and all monitors of one segment, with their signs and orders of zeros at the start."""
 
     guards: np.ndarray  # numbers of the active guards
     sides: np.ndarray  # sides (G,) of all guards

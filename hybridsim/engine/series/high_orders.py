@@ -149,7 +149,7 @@ class _Rewriting:
             total = to
 
     def _take_apart(self, row: Row) -> None:
-        """Find the terms of a sum with their signs; sums inside it that nothing else reads are expanded.
+        """Find the terms of a sum with their signs; inner sums that nothing else reads are expanded.
 
         A sum that has only negative terms stays unchanged.
         """

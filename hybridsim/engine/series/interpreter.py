@@ -319,7 +319,7 @@ def sum_sizes(U: Any, r: int, order: int, powers: Any) -> float:
 
 @inlined
 def measure(code: int, U: Any, monitored: Any, order: int, h: float, powers: Any, totals: Any) -> None:
-    """Compute the powers of h, and bounds of the Taylor sums of the monitored rows of U.
+    """Compute the powers of h, and the sums of |U[r, k]| h**k over k for the monitored rows r.
 
     code: address of a function that does so for all rows, with the totals after the powers in memory (`sizes`
     of `hybridsim.engine.series.emit_series`); 0 for none.

@@ -72,7 +72,7 @@ def later(instants: np.ndarray, step: float) -> np.ndarray:
 
 
 def _plain(kernel: Any) -> Any:
-    """Return the Python function of a kernel, which also accepts arrays."""
+    """Return the uncompiled function of a kernel, because the Python function also accepts arrays."""
     return getattr(kernel, "py_func", kernel)
 
 

@@ -219,7 +219,7 @@ class FixedStepRun:
         return self._declared_event(s, p, why)
 
     def _sides_taken(self) -> np.ndarray:
-        """Return the modes after a jump of an input, which may release held components."""
+        """Return the modes after a jump of an input; the jump may release held components."""
         z, p = self.z.copy(), self._vector()
         p[self.system.layout.pin_at] = 0.0
         values = self.system.rows(

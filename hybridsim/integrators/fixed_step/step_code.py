@@ -109,7 +109,7 @@ class StepCode:
                 yield "    release(t, x, p, z, changed)"
 
     def _slope(self, prefix: str) -> Iterator[str]:
-        """Yield code that computes the rates; at zero velocity, a rate is the mean of its values on both sides."""
+        """Yield code that computes the rates; at zero velocity, a rate is the mean for the two slip directions."""
         yield f"if {self._held()}:"
         yield f"    sides = integers({max(self.components, 1)})"
         yield f"    other = doubles({self.n})"

@@ -99,7 +99,7 @@ class CvodeStepper:
         return rhs
 
     def _jacobian(self) -> Callable[[float, np.ndarray, np.ndarray, np.ndarray], None]:
-        """Return a function that computes the model's Jacobian; finite differences would miss narrow corners."""
+        """Return a function that computes the Jacobian; CVODE's own finite differences would miss narrow corners."""
         flow, n = self.flow, self.flow.n
 
         def jacobian(s: float, x: np.ndarray, dx: np.ndarray, out: np.ndarray) -> None:

@@ -1,4 +1,4 @@
-"""Judge modes at one event in Python, by the Taylor series of their guards."""
+"""Judge modes at one event in Python, from the Taylor series of their guards."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ NO_CAUSE = -1  # rank of a candidate in which a component below its limits leave
 
 @inlined
 def is_below_limit(automata: Any, event: Any, c: int) -> bool:
-    """Return whether contact `c` is certainly below its limits, by the series of its holding mode."""
+    """Return whether contact `c` is certainly below its limits, according to the Taylor series of its holding mode."""
     for j in range(automata.guards_of.shape[2]):
         g = automata.guards_of[c, automata.hold[c], j]
         if g >= 0 and not event.judged[0, g, 0] > event.judged[1, g, 0]:
@@ -56,7 +56,7 @@ def rank_candidates(
 
 @inlined
 def rank_of(unchanged: int, held: int, count: int) -> int:
-    """Return the rank of a candidate, which increases with the numbers of unchanged modes and of holding modes."""
+    """Return the rank of a candidate; it increases with the numbers of unchanged modes and of holding modes."""
     return held + (count + 1) * unchanged
 
 

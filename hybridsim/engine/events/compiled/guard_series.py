@@ -1,4 +1,4 @@
-"""This module computes Taylor series of guards and jumps of unknowns, by which compiled loops judge modes."""
+"""This module computes what compiled loops need to judge modes: Taylor series of guards, and jumps of unknowns."""
 
 from __future__ import annotations
 

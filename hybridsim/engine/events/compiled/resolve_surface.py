@@ -112,7 +112,7 @@ def choose_surface_modes(
     k: int,
     is_known: bool,
 ) -> int:
-    """Write the admissible modes of the components of a cluster at their surfaces to `work.trial`.
+    """Choose admissible modes for the components that are at their surfaces, and write the modes to `work.trial`.
 
     Returns the number of that candidate, or -1 if the outcome is not certain. k: row of the modes before; is_known: the
     series of their guards at the event are in `judged`.

@@ -98,7 +98,7 @@ class EventScratch(NamedTuple):
 
 @inlined
 def called_by(work: Any) -> Any:
-    """Return the addresses of the model's functions, which a work space stores as an array."""
+    """Return the addresses of the model's functions, read from the array in a work space."""
     f = work.functions
     return Functions(f[0], f[1], f[2], f[3], f[4], f[5], f[6], f[7], f[8])
 

@@ -204,7 +204,7 @@ class Accumulation:
         )
 
     def reach(self, now: float) -> float:
-        """Return the longest time span for the next segment in which rounding does not hide accumulating events."""
+        """Return how long the next segment may be, so that rounding does not hide accumulating events."""
         if not self.is_under_way(now):
             return math.inf
         return min(
