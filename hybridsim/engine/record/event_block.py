@@ -216,7 +216,7 @@ class EventBlock(Sequence[Occurrence]):
         return self._instants[events[is_change]], components[is_change]
 
     def single_transitions(self) -> tuple[np.ndarray, np.ndarray] | None:
-        """Return instants (E, 2) and guards (E,), or None unless each event is one transition by the guard that fired."""
+        """Return the instants (E, 2) and the guards (E,) of the events, or None unless each event is one transition."""
         components, owner = self._all_participants[1], self._system.owner
         if not self._is_plain or self._first or not ((self._fired >= 0) & (self._fired < len(owner))).all():
             return None

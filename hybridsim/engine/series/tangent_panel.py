@@ -43,7 +43,7 @@ def panel(registers: int, directions: int) -> Any:
 
 @inlined
 def set_everywhere(panel: Any, r: int, value: float, seeds: Any, row: int) -> None:
-    """Set the value of a register and its derivatives to the same numbers at all points; without seeds if row < 0."""
+    """Set a register to the same value and derivatives at all points; the derivatives are zero if row < 0."""
     W, width = panel.registers, panel.registers.shape[1]
     store(W, r * width * WIDTH, splat(value))
     active = 0
@@ -83,7 +83,7 @@ def set_points(panel: Any, inputs: Any, s: Any, x: Any, first: int, count: int, 
 
 @kernel
 def _combine(panel: Any, out: int, a: int, b: int, first: Any, second: Any) -> None:
-    """Set the derivatives of `out` to first * (those of a) + second * (those of b), or the first part only if b < 0.
+    """Set the derivatives of `out` to first * D[a] + second * D[b], where D are derivatives; omit b if b < 0.
 
     A zero derivative times an infinite factor is zero.
     """
@@ -104,7 +104,7 @@ def _combine(panel: Any, out: int, a: int, b: int, first: Any, second: Any) -> N
 
 @kernel
 def _select(panel: Any, a: int, b: int, c: int, out: int) -> None:
-    """Choose the derivatives of b or c by the condition a; equality at one point does not hold next to it."""
+    """Choose the derivatives of b or c by the condition a; an equality counts as false, as it holds at one point only."""
     W, active = panel.registers, panel.active
     active[out] = 1
     for m in range(WIDTH):
