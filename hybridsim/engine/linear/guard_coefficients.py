@@ -75,7 +75,7 @@ def rough_side(lin: Any, k: int, g: int, order: int, work: Any) -> int:
 
 @inlined
 def linear_series(lin: Any, k: int, g: int, first: int, work: Any) -> None:
-    """Write the Taylor coefficients of a guard to `judged`, up to the first coefficient with a certain sign.
+    """Write the Taylor coefficients of a guard to `judged`, up to the first one that exceeds its error bound.
 
     Nothing is written if there are no tables of linear modes. k: row of the modes. The point is y = (x_after, w); see
     `measure_point`.

@@ -29,7 +29,7 @@ def _series_dense(coefficients: np.ndarray, start: float) -> Dense:
 
 @inlined
 def _step_at(steps: Any, first: int, last: int, s: float) -> int:
-    """Return the step of a segment that contains a local time."""
+    """Return the number of the step that contains a local time of a segment."""
     while first < last:
         middle = (first + last + 1) // 2
         if steps[middle, 0] <= s:

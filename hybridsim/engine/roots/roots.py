@@ -114,7 +114,7 @@ def _within(b: np.ndarray, bound: np.ndarray) -> bool:
 
 @allocating_kernel
 def sign_pattern(b: np.ndarray, bound: np.ndarray) -> tuple[np.ndarray, int]:
-    """Return intervals with certain or undecided sign as rows (left, right, sign)."""
+    """Return intervals as rows (left, right, sign); the sign is 0 where rounding may hide it."""
     n = b.shape[0]
     rows = np.empty((1024, 3))
     count = 0

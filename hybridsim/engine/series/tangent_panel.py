@@ -104,7 +104,7 @@ def _combine(panel: Any, out: int, a: int, b: int, first: Any, second: Any) -> N
 
 @kernel
 def _select(panel: Any, a: int, b: int, c: int, out: int) -> None:
-    """Choose the derivatives of b or c by the condition a; an equality counts as false, as it holds at one point only."""
+    """Choose the derivatives of b or c by the condition a; an equality counts as false, as it holds at one point."""
     W, active = panel.registers, panel.active
     active[out] = 1
     for m in range(WIDTH):

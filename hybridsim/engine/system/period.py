@@ -28,7 +28,7 @@ def common_period(system: System) -> float | None:
 
 
 def common_multiple(periods: list[float]) -> float | None:
-    """Return the least multiple of the longest period that all other periods divide, or None."""
+    """Return the least multiple of the longest period that is a multiple of all other periods, or None."""
     return _multiple_of_all(periods, _MAX_PERIOD_RATIO) if periods else None
 
 

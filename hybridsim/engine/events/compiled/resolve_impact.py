@@ -174,7 +174,7 @@ def _set_sides(automata: Any, tapes: Any, lin: Any, k: int, fired: int, work: An
 
 @inlined
 def _is_clear_after(tapes: Any, lin: Any, k: int, fired: int, work: Any) -> bool:
-    """Return whether the gap opens at a certain speed, and all other guards are away from zero after the impact."""
+    """Return whether, after the impact, the gap certainly opens and no other guard can be zero."""
     for i in range(tapes.active_start[k], tapes.active_start[k + 1]):
         g = tapes.active[i]
         if work.all_orders[0, g] != (1 if g == fired else 0):

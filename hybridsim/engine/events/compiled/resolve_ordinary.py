@@ -1,4 +1,4 @@
-"""Resolve ordinary events in compiled code: one guard of one component fires, with a certain outcome.
+"""Resolve ordinary events in compiled code: one guard of one component fires, and rounding cannot change the outcome.
 
 The rules are those of `hybridsim.engine.events.choice`. Other events are left unchanged for
 `hybridsim.engine.events.resolve`, which can report the reason: several guards at once, a case undecided at rounding, a

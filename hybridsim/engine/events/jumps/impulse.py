@@ -74,7 +74,7 @@ def count(problem: ImpactProblem) -> int:
 
 
 def answers(problem: ImpactProblem) -> list[Answer]:
-    """Return all solutions of the impact law that lead to different motions."""
+    """Return the solutions of the impact law, with one solution for each different motion."""
     rebound = problem.restitution * np.maximum(-problem.before[: problem.normal], 0.0)
     found = _answers(problem, rebound)
     if len(found) != 1 or not _gains(problem, found[0].impulses) or not rebound.any():

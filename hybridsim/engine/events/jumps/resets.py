@@ -142,7 +142,7 @@ def _evaluated(system: System, at: Situation, key: Key) -> tuple[np.ndarray, np.
 
 
 def _of_numbers(system: System, at: Situation, key: Key) -> np.ndarray:
-    """Return the errors of all variables that the rounding of numbers in the formulas of a reset causes."""
+    """Return the errors that rounded numbers in the formulas of a reset cause in the states and discrete states."""
     found = np.zeros(system.n + len(system.model.discrete))
     values = dict(zip(system.names, at.x.tolist(), strict=True))
     discrete = at.p[system.layout.discrete_slice].tolist()
