@@ -19,7 +19,7 @@ from hybridsim.errors import ModelError
 def shared_rates(
     lowering: LoweringState, i: int, der: list[Any], held: HeldStates
 ) -> Iterator[tuple[int, Any]]:
-    """Yield the relays that determine the rate of state `i` while they slide, each with this rate.
+    """Yield each relay that determines the rate of state `i` while it slides, together with this rate.
 
     The relay's held state must be evaluated from its surface and must be another state. Of the rates in ds/dt
     the relay must act only on this one, and the derivative of s by this state must not depend on states.

@@ -270,7 +270,7 @@ def errors_when_due(
 
 
 def add_steps(system: System, at: Situation, scale: np.ndarray, steps: int, stages: np.ndarray) -> None:
-    """Add the rounding errors of a number of steps to the errors of the states.
+    """Add the rounding errors of `steps` steps to the error bounds of the states.
 
     A step is a sum of rounded terms. scale: size of the states plus the distance they moved. stages: that distance
     times the sum of the stages of the method, which cancel each other.

@@ -1,4 +1,4 @@
-"""This module computes the short Taylor series that decide events."""
+"""This module computes short Taylor series at a point, from which events are resolved."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""This module computes derivatives where an operation has none, such as at a kink, as limits from both sides.
+"""This module computes derivatives at points at which an operation of a function has none, as limits from both sides.
 
 The function as a whole may be differentiable there: |x|**1.5 is at zero, and abs(x) is not. Its derivatives at three
 distances on both sides decide. They converge to one limit if the function is continuously differentiable.

@@ -137,7 +137,7 @@ def _agreed(
 
 
 def _departure(system: System, outcome: Outcome, c: int, bounce: Bounce) -> _Departure | None:
-    """Return the motion of the guard that leaves zero and returns in the new mode, or None if no guard does."""
+    """Return the motion of the guard of the new mode that rises from zero and will fall again, or None."""
     series = _series(system, outcome, c, bounce.instant, bounce.target, bounce.x_plus)
     for guard in system.automata[c].guards[bounce.target]:
         (value, rate, curve), bound = series.guards[guard, :3].tolist(), float(series.guard_bounds[guard, 0])
@@ -167,7 +167,7 @@ def _forecast(
 
 
 def _backward(automaton: Automaton, last: Bounce, record: Trajectory) -> Iterator[Bounce]:
-    """Yield the earlier bounces of a component, backward in time, until the component was in its holding mode."""
+    """Yield the earlier bounces of a component, latest first, back to its last departure from the holding mode."""
     blocks = reversed(record.occurrences.blocks)
     events = (block[i] for block in blocks for i in range(len(block) - 1, -1, -1))
     for o in islice(events, LOOKED_BACK_ON):
