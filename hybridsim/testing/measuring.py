@@ -169,7 +169,7 @@ def compare_events(scene: Scene, solution: Any) -> tuple[list[str], float]:
         position += len(names)
     if position < len(found):
         extra = ", ".join(f"{name} at t = {t!r}" for t, name in found[position : position + 3])
-        return [f"events found: {len(found)}, due: {position}; the first too many: {extra}"], 0.0
+        return [f"events found: {len(found)}, due: {position}; the first superfluous events: {extra}"], 0.0
     return [], error
 
 

@@ -28,7 +28,7 @@ from hybridsim.testing.verdict import LACKS, RIGHT, WRONG_ANSWER, verdict
 
 @dataclass(frozen=True)
 class Outcome:
-    """The verdict on one integrator in one test case.
+    """The result of running one test case with one integrator: the verdict, its reasons, and the errors of the runs.
 
     Parameters
     ----------

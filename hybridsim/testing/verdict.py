@@ -49,7 +49,7 @@ def verdict(study: Study) -> tuple[str, str]:
 
 
 def of_run(run: Measured) -> tuple[str, str]:
-    """Return the verdict on one run, without numeric errors."""
+    """Return the verdict on one run and its reason; numeric errors are not considered."""
     # a run that stops early and states the reason does not mislead the user
     silent = WRONG_ANSWER if run.status in ENDED else REFUSED
     if run.ending:

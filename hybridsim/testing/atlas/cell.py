@@ -36,7 +36,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Cell:
-    """The verdict on one method in one test case.
+    """The result of running one test case with one method: the verdict, its reason, and the errors of the runs.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def run_cell(scene: Scene, configuration: Configuration, quick: bool = False) ->
     reason = configuration.applies(scene)
     length = abs(scene.span[1] - scene.span[0]) / scene.unit
     if not reason and length > LONG and length < 1e6 and not configuration.is_compiled:
-        reason = f"{length:.0f} units of time: long rows are for compiled methods"
+        reason = f"the run of {length:.0f} time units is too long for a method that is not compiled"
     if reason:
         return Cell(scene.name, configuration.name, NOT_RUN, reason)
     settings = configuration.settings(scene)

@@ -29,7 +29,7 @@ Progress = Callable[[float, str], None]
 
 @dataclass(frozen=True)
 class Atlas:
-    """The verdicts on all methods in all test cases.
+    """The results of all methods in all test cases.
 
     Parameters
     ----------

@@ -16,7 +16,7 @@ def scenes() -> tuple[Scene, ...]:
 
 
 def _twisting() -> Scene:
-    """Return the test case of a twisting motion, in which each half turn is sqrt(3) times shorter than the last one."""
+    """Return the test case of a twisting motion, in which each half turn is 1/sqrt(3) as long as the previous one."""
     half, end = 4 * math.sqrt(2) / 3, 4 * math.sqrt(2) / 3 / (1 - 1 / math.sqrt(3))
     first, second = half, half * (1 + 1 / math.sqrt(3))
 
@@ -31,7 +31,7 @@ def _twisting() -> Scene:
         held = [event.t for event in solution.events if event.target == "sliding"]
         late = [t for t in held if abs(t - end) > 1e-9 * end]
         return (
-            [f"the motion is held {at_times(held)} instead of {end!r}, along both"]
+            [f"sliding begins {at_times(held)} instead of {end!r} along both surfaces"]
             if late or len(held) != 2
             else []
         )
@@ -47,7 +47,7 @@ def _twisting() -> Scene:
 
 
 def _tanks() -> tuple[Scene, ...]:
-    """Return test cases of two water tanks, in which each visit of the hose is half as long as the last one."""
+    """Return test cases of two water tanks, in which each visit of the hose is half as long as the previous one."""
     t, x = 2.0, [0.5, 0.0]  # the second tank is low
     events, low, left = [(t, "hose:second")], 1, 1e-4
     states = [(1.0, (0.25, 0.5)), (3.0, (0.0, 0.25))]

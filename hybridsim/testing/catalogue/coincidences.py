@@ -1,4 +1,4 @@
-"""Scenes of events at one instant: coinciding guards, flat guards, resets onto guards, and ends of runs."""
+"""Scenes of events at one instant: coinciding guards, flat guards, guards that a reset makes zero, and ends of runs."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from hybridsim.testing.scene import END, Scene, Truth, named, needs
 
 
 def scenes() -> tuple[Scene, ...]:
-    """Return test cases of guards that coincide, are zero at the start or are flat, and of resets onto guards."""
+    """Return test cases of guards that coincide, are zero at the start, are flat, or become zero by a reset."""
     after = ("a:after", "b:after")
     return (
         Scene(

@@ -41,7 +41,7 @@ def _backlash() -> Scene:
 
 
 def _saturation() -> Scene:
-    """Return the test case of the integral of 2 sin(t), clipped to 1 between pi/6 and 5 pi/6."""
+    """Return the test case of x' = 2 sin(t) with saturation, so that x' is 1 between pi/6 and 5 pi/6."""
     rise = 2 * (1 - math.cos(math.pi / 6))
     top = rise + 2 * math.pi / 3
     states = (

@@ -116,7 +116,7 @@ def modes() -> tuple[Scene, ...]:
 
 
 def monitored() -> tuple[Scene, ...]:
-    """Return tests of monitors: directed, with several roots per step, at t0, at step ends, and with output grids."""
+    """Return tests of monitors: with a direction, several roots per step, zeros at t0 or step ends, output grids."""
     zeros = ((-6.0, "zero"), (-2.0, "zero"), (2.0, "zero"))
     sides = ((-6.0, "mode:above"), (-2.0, "mode:below"), (2.0, "mode:above"))
     values = ((-7.0, (-45.0,)), (0.0, (-24.0,)), (4.0, (120.0,)))

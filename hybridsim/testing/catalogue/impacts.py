@@ -50,7 +50,7 @@ def closes(*names: str) -> Any:
 
 
 def rests(*names: str) -> Any:
-    """Return a function that checks that the contacts close at the limit of the bounces, within 1e-6."""
+    """Return a function that checks that contacts close at the time at which the bounces end, within 1e-6."""
 
     def check(solution: Any) -> list[str]:
         found = {name: closed(name, solution) for name in names}

@@ -98,7 +98,7 @@ def _never_crossed(solution: Any) -> list[str]:
 
 
 def _samples() -> Scene:
-    """Return the test case of a sine that is sampled at each change by 2, and also at its extremes.
+    """Return the test case of a sine that is sampled whenever it has changed by 2; its extremes only touch a level.
 
     Whether these touches are sampled is open, and with them the first level on the way back.
     """
@@ -128,7 +128,7 @@ def _samples() -> Scene:
 
 
 def _copied() -> Scene:
-    """Return the test case of x = 10 - 11.3 cos(sqrt(3) t), whose copy decreases once x has reached 0.7."""
+    """Return the test case of x = 10 - 11.3 cos(sqrt(3) t), which is copied to other states when it reaches 0.7."""
     at, end = math.acos(9.3 / 11.3) / math.sqrt(3.0), 1.0
 
     def state(t: float) -> tuple[float, ...]:
@@ -163,4 +163,4 @@ def _successive_zeros() -> Scene:
 
 def _not_near(solution: Any) -> list[str]:
     near = [event.t for event in solution.events if event.kind == "near-grazing"]
-    return [f"a guard is called near to zero {at_times(near)}, which leaves it there"] if near else []
+    return [f"a near-grazing is reported {at_times(near)}, where the guard leaves zero"] if near else []

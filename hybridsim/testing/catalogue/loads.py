@@ -105,7 +105,7 @@ def _series() -> Scene:
 
 
 def _painleve() -> Scene:
-    """Return the test case of two admissible motions; the message of the run must name both motions."""
+    """Return the test case of a start with two admissible motions; the message of the run must name both."""
     return Scene(
         "painleve-start",
         "painleve",
