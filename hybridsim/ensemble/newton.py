@@ -90,7 +90,7 @@ def _newton(packs: Any, searches: Any, scratch: Any, i: int, multiple: int, tol:
 
 @inline_always
 def _shortest(packs: Any, points: Any, scratch: Any, i: int, multiple: int, tol: float) -> tuple[int, int]:
-    """Find the shortest period of the motion; return the number of forcing periods in it, and of its segments.
+    """Find the shortest period of the motion; return its number of forcing periods and its number of segments.
 
     There are 0 segments if the motion nearly repeats earlier. multiple: number of periods after which it repeats.
     """

@@ -1,4 +1,4 @@
-"""This module applies the map over forcing periods in compiled code, with the derivative of the map through all events.
+"""This module computes, in compiled code, the map over forcing periods and its derivative through all events.
 
 At an event with guard g the derivative Y of the states becomes Y + (f- - f+) dt with dt = -(g_x Y)/(g_t + g_x f-), as
 in `hybridsim.analysis.variations.carried`: contacts do not move the states at an event. A holding contact keeps its
@@ -77,7 +77,7 @@ def _hold(automata: Any, z: Any, matrix: Any) -> None:
 
 @inline_always
 def carry_derivative(packs: Any, lin: Any, count: int, scratch: Any) -> None:
-    """Write the derivative of the last recorded state by the first recorded state to `scratch.matrix`."""
+    """Write to `scratch.matrix` the derivative of the last recorded state with respect to the first one."""
     automata, record, rows, work, own = (
         packs.model.automata,
         packs.record,

@@ -63,7 +63,7 @@ class Fixed(NamedTuple):
 
 
 class PeriodSummary(NamedTuple):
-    """The measures of a period of one point, or of several points if there is a leading axis.
+    """The measures of one period at one point; with a leading axis, the measures at several points.
 
     All but the last field are those of `hybridsim.engine.linear.motion_summary.MotionSummary`.
     """

@@ -73,7 +73,7 @@ def nearest_return(states: Any, count: int, scale: Any) -> int:
 
 @inline_always
 def periods_left(states: Any, count: int, m: int, scale: Any, tol: float) -> float:
-    """Return the expected number of further periods until states that return after m periods have settled."""
+    """Estimate how many more periods a motion that repeats every m periods needs to settle to the tolerance."""
     last = count - 1
     residual, back = relative_change(states[last - m], states[last], scale), last // (2 * m)
     if back == 0:

@@ -34,7 +34,7 @@ class Runs(NamedTuple):
 
 @kernel
 def run_ensemble(packs: Any, none: Any, fixed: Any, runs: Any, record: Any, rows: Any, found: Any) -> None:
-    """Run the points of a group in order, until all are done or a number of segments is computed.
+    """Run each point of a group, in order; stop early when the number of segments reaches a limit.
 
     packs: `LoopPacks`, whose record is the second half of `record` and `rows` (`LoopRecord`, `ClosedFormRows`). none:
     empty tables; fixed: `hybridsim.ensemble.points.Fixed`. found: `PeriodSummary` of one run.

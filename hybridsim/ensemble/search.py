@@ -73,7 +73,7 @@ class SearchScratch(NamedTuple):
 
 @kernel
 def search_orbits(packs: Any, none: Any, fixed: Any, searches: Any, scratch: Any, settings: Any) -> bool:
-    """Search the motions of the points of a group in order, until all are done or many segments are computed.
+    """Search the steady motion at each point, in order; stop early when the number of segments reaches a limit.
 
     packs: `LoopPacks`; none: empty tables; fixed: `hybridsim.ensemble.points.Fixed`. settings: tolerance, first number
     of periods, and largest number. Return whether the next point needs Newton's method, which is not compiled yet. Its

@@ -75,7 +75,7 @@ class EnsembleTables:
 def ensemble_tables(
     system: System, modes: np.ndarray, parameters: np.ndarray, horizons: np.ndarray
 ) -> list[EnsembleTables]:
-    """Return tables of some combinations of modes at many points: parameters (N, P), horizons (N,).
+    """Return tables of some combinations of modes at N points with the given parameters (N, P) and horizons (N,).
 
     There is one group for each order of magnitude of the horizon and each template. Points with tables that are not
     finite are left out.

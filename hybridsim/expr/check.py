@@ -41,8 +41,8 @@ _QUANTIZER = (
 _INSTEAD = {
     "v_rel": "v_rel exists only in results; write the velocity of the contact, or a definition of it",
     "round": _QUANTIZER,
-    "floor": f"{_QUANTIZER}; floor(x) is that of x - 0.5 with the step 1",
-    "ceil": f"{_QUANTIZER}; ceil(x) is that of x + 0.5 with the step 1",
+    "floor": f"{_QUANTIZER}; for floor(x), use the input x - 0.5 and the step 1",
+    "ceil": f"{_QUANTIZER}; for ceil(x), use the input x + 0.5 and the step 1",
     "mod": "mod(t, T) is an input of kind 'wave' and shape 'sawtooth' with the period T, the amplitude T/2 and the "
     "offset T/2; mod(x, d) is x minus an element of kind 'quantizer' with the input x - d/2 and the step d",
     "delay": "declare an element of kind 'delay'",
