@@ -91,7 +91,7 @@ def to_ivp(
     flows: dict[bytes, Flow] = {}
 
     def at(t: float, x: np.ndarray) -> tuple[Flow, float]:
-        """Return the `Flow` at (t, x) and its local time, with the active pieces of inputs and tables."""
+        """Return the `Flow` and the local time at time t and states x; inputs and tables are on their active pieces."""
         vector, s = (
             (system.vector(Instant(float(t)), discrete), 0.0) if system.signals else (from_zero, float(t))
         )

@@ -65,7 +65,7 @@ class _Settings(NamedTuple):
 
 
 class _SettingsOfRuns(dict[tuple[Any, ...], _Settings]):
-    """Settings by the arguments of runs. Models are pickled without settings, because a method may be a local class."""
+    """Settings of runs, by arguments. Pickled models leave them out, because a method may be a local class."""
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _SettingsOfRuns, ()
@@ -102,7 +102,7 @@ def prepared(
     options: dict[str, Any],
     keywords: Sequence[str],
 ) -> tuple[Run, float]:
-    """Return the prepared run and the compile time in seconds; `keywords` are for suggestions."""
+    """Return the prepared run and the compile time in seconds; `keywords` are names to suggest."""
     every_argument: tuple[Any, ...] = (integrator, rtol, atol, max_step, first_step, save)
     if options:  # an integer option rejects 16.0, which equals 16
         every_argument += (*chain(*options.items()), *(type(value).__name__ for value in options.values()))

@@ -114,7 +114,7 @@ class ModelTrajectory(ModelEvents):
     def by_segment(
         self, times: np.ndarray, side: str
     ) -> tuple[np.ndarray, list[tuple[SegmentConstants, np.ndarray, np.ndarray]]]:
-        """Return states (k, n) at given times, and for each segment the indices and local times of its given times."""
+        """Return states (k, n) at given times, and for each segment its constants, indices and local times."""
         index, s = self.segment_at(times, side)
         order = np.argsort(index, kind="stable")
         found, first = np.unique(index[order], return_index=True)

@@ -19,7 +19,9 @@ Integrand = Callable[[np.ndarray], np.ndarray]
 def integral(
     integrand: Integrand, edges: np.ndarray, width: int, least: np.ndarray | float = 0.0
 ) -> np.ndarray:
-    """Return the integrals (width,) of a function from times (k,) to values (k, width), from edges[0] to edges[-1].
+    """Return the integrals (width,) of a function of time from edges[0] to edges[-1].
+
+    integrand: a function from times (k,) to values (k, width).
 
     ::
 

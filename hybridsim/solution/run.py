@@ -32,7 +32,7 @@ class Run:
     reason: str = ""
 
     def on_grid(self, grid: np.ndarray | None) -> Run:
-        """Return the same run with its solution at other times."""
+        """Return the same run with a solution at other output times."""
         if grid is self.grid:
             return self
         return Run(self.model, self.system, self.method, self.task, grid, self.save, self.reason)

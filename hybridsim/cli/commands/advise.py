@@ -15,8 +15,8 @@ from hybridsim.errors import UsageError
 from hybridsim.model import Model
 
 _EXAMPLES = """\
-quantities of the steady motion, or with --t-end of a run: amplitude.x, peak.x, maximum.f, minimum.f, mean.x, energy.x,
-harmonic.x.3, dissipated.f, stick_fraction.f, period. Quantities of a run only: final.x, event_time.f.2.
+quantities of the steady motion, or of a run if --t-end is set: amplitude.x, peak.x, maximum.f, minimum.f, mean.x,
+energy.x, harmonic.x.3, dissipated.f, stick_fraction.f, period. Only with --t-end: final.x, event_time.f.2.
 
 examples:
   hybridsim advise dfcs -p F0=100 --quantity amplitude.x --tol 0.03

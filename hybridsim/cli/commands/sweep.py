@@ -62,8 +62,8 @@ def add_to(commands: Any) -> None:
         "--measure",
         "A,B",
         "quantities of the steady state: steady (default) for the usual ones, or amplitude.x, energy.x, "
-        "harmonic.x.1, stick_fraction.f, period, kind, ...; with --t-end of a run: final.x, maximum.x, rms.x, "
-        "stops.f, 'first_passage.x>0.1', ..., or final for all states",
+        "harmonic.x.1, stick_fraction.f, period, kind, ...; with --t-end, quantities of a run: final.x, maximum.x, "
+        "rms.x, stops.f, 'first_passage.x>0.1', ..., or final for all states",
         values.names,
         default=("steady",),
     )

@@ -126,7 +126,7 @@ def _changes_outside(
     top: int,
     rtol: float,
 ) -> float:
-    """Return the relative change of other nodes over time h if the outermost nodes of a patch get their new series."""
+    """Return how much nodes outside a patch change, relatively, over time h if its outermost nodes get new series."""
     worst = 0.0
     for i in range(outer, count):
         j = scratch.nodes[i]

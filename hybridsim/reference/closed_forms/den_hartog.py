@@ -65,7 +65,7 @@ def no_stops(r: float, zeta: float, f: float) -> NoStops:
 
 
 def _free(r: float, zeta: float) -> tuple[tuple[float, float], float]:
-    """Return the coefficients of the free vibration and its velocity at the turning point, for f = 1."""
+    """Return the coefficients (a, b) of the free vibration for f = 1, and its velocity at the turning point."""
     kappa = math.sqrt(1.0 - zeta * zeta)
     half = math.pi / r
     decay, c, s = math.exp(-zeta * half), math.cos(kappa * half), math.sin(kappa * half)

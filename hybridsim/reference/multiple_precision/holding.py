@@ -68,7 +68,7 @@ class Holding:
         return {j for j in range(len(product)) if product[index][j] != 0 or product[j][index] != 0}
 
     def _find_slopes(self) -> None:
-        """Compute the slope of each surface along each state, from its first-order coefficient."""
+        """Compute the slope of each surface with respect to each state, from first-order coefficients."""
         zero, one = self.context.zero, self.context.one
         rows = []
         for i in range(-1, len(self._states)):

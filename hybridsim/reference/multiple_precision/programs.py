@@ -53,7 +53,7 @@ class Programs:
         return tuple(changed)
 
     def modes_by_side(self, point: Point, modes: Modes) -> Modes:
-        """Return the modes with every undecided component on the side of its surface, or holding a surface at zero."""
+        """Return the modes with each undecided component on the side of its surface, or holding at a zero surface."""
         if UNDECIDED not in modes:
             return modes
         decided = self.decided(modes)

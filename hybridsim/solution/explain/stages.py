@@ -82,7 +82,7 @@ def place_of(
 def _matched(
     system: System, transitions: Sequence[Occurrence], stages: Sequence[Stage]
 ) -> tuple[dict[int, Place], list[Occurrence]]:
-    """Assign transitions to stages; return the places by number of the transition, and the unassigned transitions."""
+    """Find the stage that made each transition; return places by transition number, and transitions without a stage."""
     made = [Place(stage, change) for stage in stages for change in stage.changes]
     found, left, start = {}, [], 0
     for number, occurrence in enumerate(transitions):
@@ -130,7 +130,7 @@ class _Instant:
         ]
 
     def located(self, fired: list[int]) -> list[Stage]:
-        """Return the choices of modes that located guards and monitors caused."""
+        """Return the choices of modes that followed from located guards and monitors."""
         at = situation(self.system, self.segment, fired)
         found = self._nothing(at, {g: k for k, g in enumerate(fired)})
         if self.is_general and (self.schedules or self.knots) and (fired or self.stopping):
@@ -158,7 +158,7 @@ class _Instant:
         return self._settled(self._nothing(at), crossed, ())
 
     def due(self, stage: Stage | None, first: Occurrence | None) -> list[Stage]:
-        """Return the choices of modes that due events, and the resets of these events, caused."""
+        """Return the choices of modes that followed from due events, and from monitors that these events fired."""
         system, segment = self.system, self.segment
         if first is None or not (self.schedules or self.knots):
             return []
