@@ -89,42 +89,48 @@ def main() -> None:
     PAGE.write_text(
         f"""# Coupled contacts
 
-Are coupled contacts decided correctly? In {decided} decisions of random systems, {inadmissible} were not admissible.
+Are the modes of coupled contacts selected correctly? Of {decided} selections in random systems, {inadmissible} were
+not admissible.
 
 `docs/studies/coupled_contacts.py` draws random mechanical systems of 2 to 12 coordinates and 2 to 5 contacts. The
-mass and stiffness matrices are dense. The direction of a contact contains one, two or all coordinates. The bases
-are at rest or move. The applied force is harmonic. Each run lasts {SPAN:g} units of time at rtol {RTOL:g}.
+mass and stiffness matrices are dense. The relative velocity of a contact depends on one, two or all coordinates.
+The base of a contact is at rest or moves. The applied forces are harmonic. Each run lasts {SPAN:g} units of time at
+rtol {RTOL:g}.
 
 At each event the script tries all combinations of stick, slip forward and slip backward for the contacts at rest.
 For each combination it computes the accelerations, the forces and two time derivatives of the forces. It solves the
-whole system of equations in 40 digits, without a Delassus operator and without pivoting, which hybridsim uses. The
-decision of the run must be among the admissible combinations. Each system also runs with its coordinates and
-contacts in {ORDERS} other orders of declaration.
+whole system of equations in 40 digits. The method of hybridsim is different, because it uses a Delassus operator
+and pivoting. The modes that the run has selected must be one of the admissible combinations.
+
+Each system also runs with its coordinates and contacts declared in {ORDERS} other orders. The columns "orders
+apart" give the largest difference of the final states between these runs and the first run.
 
 | law | systems | instants decided | not admissible | several admissible | orders apart: median | largest |
 | --- | --- | --- | --- | --- | --- | --- |
 {table}
 
-If static and kinetic friction are equal, the motion is unique. Nevertheless the check sometimes counts several
-combinations. It uses only two derivatives, or none for redundant sets of contacts, and treats values below 1e-9 as
-zero. With static friction above kinetic friction, several outcomes may be
-possible. The run begins with stick in all contacts that may stick, and then releases the contacts whose force
-exceeds the limit. Different orders of declaration can lead to different results because of rounding. These
-differences grow because neighbouring motions move apart.
+If static and kinetic friction are equal, the motion is unique. The script nevertheless counts several admissible
+combinations at some instants, because its test is not strict. The test treats values below 1e-9 as zero. It uses
+only two derivatives of the forces, and none for redundant sets of contacts.
+
+If static friction exceeds kinetic friction, several motions may be possible. hybridsim first assumes stick in all
+contacts that may stick, and then releases the contacts whose force exceeds the limit. The final states of two
+orders of declaration differ because of rounding.
 
 ## Work and energy
 
-Over each run the change of the energy v.Mv/2 + q.Kq/2 must equal the work of the forcing minus the work of dampers
-and friction. Each work is an integral over the dense output, by Gauss-Legendre quadrature. It has 20 nodes between
-any two successive times at which a series begins or an event happens. The table gives the difference between the
-two sides, relative to the work of friction. The work of friction is the integral of the sum of f (w.v - base).
+The energy of a system is v.Mv/2 + q.Kq/2, with the coordinates q, the velocities v, the mass matrix M and the
+stiffness matrix K. The change of this energy over a run must equal the work of the applied forces minus the work of
+dampers and friction. The column "residual" gives the error of this balance, relative to the energy that friction
+dissipates. Each work is an integral over the dense output of the run. A Gauss-Legendre quadrature with 20 nodes
+computes the integral over each step of the run.
 
 | law | residual: median | largest | 16 nodes instead of 20 change the work of friction by at most |
 | --- | --- | --- | --- |
 {energies}
 
-The runs are at rtol {RTOL:g}. If the friction force depends on the speed, the computed work has the error of the
-run. For the laws `coulomb` and `static-kinetic`, the computed work has only rounding errors.
+With the law `hyperbolic` the friction force depends on the speed, so the computed work contains the error of the
+run at rtol {RTOL:g}. With the laws `coulomb` and `static-kinetic` the computed work has only rounding errors.
 """,
         encoding="utf-8",
     )
