@@ -136,20 +136,21 @@ def page(rows: list[str], never: list[float]) -> str:
 How much do monitors, clocks, tables and impacts add to the time of a run? With a linear monitor that never fires, a
 run takes {min(never):.2f} to {max(never):.2f} times as long as without it.
 
-`exact`, `taylor` and `dop853` run from event to event in compiled code, in which an ordinary event takes
-microseconds. Python handles events that need a message or a joint decision, in about a millisecond. Two rows of
-the table have such events:
+`exact`, `taylor` and `dop853` run from event to event in compiled code. There an ordinary event takes a few
+microseconds. Other events take about a millisecond, because Python code handles them. An example is an event at
+which the modes of several components are selected together. Python code handles these parts of the table:
 
-- A quadratic monitor is not a closed form of `exact`.
-- A monitor of the sliding speed is zero at the same time as the guard of the contact. The monitor and the contact
-  are then decided together.
+- With `exact`, the quadratic monitor. A quadratic expression is not one of the closed forms of `exact`.
+- The monitor of the sliding speed. It is zero at the same times as the guard of the contact, so the monitor and the
+  contact have an event together.
 
-An impact that strikes one contact is ordinary. Python decides an impact that strikes several contacts together.
+An impact at a single contact is an ordinary event. Python code handles an impact that strikes several contacts or
+loads friction.
 
-`python docs/studies/event_costs.py` writes this page. The table gives medians of processor time in one process. A
-run with the part in the first column and a run without this part alternate. The monitors are added to 100 periods
-of the system of He et al. The clock and the table drive an oscillator. In the rows with impacts a falling body
-bounces without loss. {machine()}
+`python docs/studies/event_costs.py` writes this page. The table gives medians of processor time in one process.
+Runs with the part in the first column alternate with runs without this part. The monitors belong to a run of the
+oscillator of He et al. over 100 periods. The clock and the knots of an input belong to a damped oscillator. In the
+rows "an impact" and "a guard with a reset" a falling body bounces without loss. {machine()}
 
 {table}
 """
