@@ -148,7 +148,10 @@ def table(done: list[dict[str, Any]]) -> str:
     for fault in answers:
         one = results[fault.name]
         out += f"| {fault.words} | {fault.trial} | {one['structures']} | {shown(one['by'])} |\n"
-    out += "\nTests instead of trials find faults of files and of the cache:\n\n"
+    out += (
+        "\nThe trials do not cover files and the cache. For each fault of this kind the table names a "
+        "test:\n\n"
+    )
     out += "| fault | test | found |\n| --- | --- | --- |\n"
     for fault in faults():
         if fault.trial == "test":
