@@ -82,37 +82,39 @@ def read(results: Path) -> list[Case]:
 
 TEXT = """# Wrong files, wrong command lines
 
-Does a faulty model file or command line ever cause an internal error? {verdict} The script `docs/studies/fuzz.py` ran
-{files} model files, {parts} models with parts and {lines} command lines. They contain typical mistakes of users,
-editors and scripts, and deliberate attacks. No case may cause an internal error, a traceback, a warning of a library, a
-hang or an unwanted file. No text of a file may run as code.
+Does a faulty model file or command line ever cause an internal error? {verdict} The script `docs/studies/fuzz.py`
+ran {files} model files, {parts} models with parts and {lines} command lines. The files and command lines contain
+typical mistakes of users, editors and scripts, and deliberate attacks. No case may cause an internal error, a
+traceback, a warning of a library, a hang or an unwanted file. No text of a file may run as code.
 
 ## Model files
 
-Each file is a model of the package or a scene of the atlas. One to a few of these changes are applied:
+Each file is a model of the package or a scene of the atlas, with one or more of these changes:
 
 - A line is lost, doubled or moved.
 - A number is far out of range (5e-324, 1e308, a thousand digits).
 - A type is wrong, or a key is misspelt.
-- An expression is code, too deep, too long or without a value.
-- The text has letters of other scripts, control characters or bytes that are not text.
+- An expression is program code, has too many nested brackets, is too long, or has no value.
+- The text has letters of other alphabets, control characters or bytes that are not text.
 
-Each accepted file is checked for warnings. It then runs with a random integrator, for up to a second of its own time.
-The limits are 2 seconds, 5000 steps and 500 megabytes.
+Each accepted file is checked for warnings. Its model then runs with a random integrator, over at most one unit of
+simulated time. The limits of the run are 2 seconds, 5000 steps and 500 megabytes.
 
 | ending | files |
 | --- | --- |
 {file_rows}
 
-A *refusal* is an error that names the fault and its place. An error *on running* is an error that only a run can
-find. For example, the method may lack a capability, or no mode may be possible at the start. A case that takes longer
-than {limit:g} seconds is a *hang*. All other endings in the table are statuses of runs.
+A file is *refused* if it cannot be loaded. The error names the fault and its place. An error *on running* occurs
+only when the loaded model runs. For example, the method may lack a capability, or no mode may be possible at the
+start. A case that takes longer than {limit:g} seconds is a *hang*. All other endings in the table are statuses of
+runs.
 
 ## Models with parts
 
-Each model has up to five parts from two other files, with random connections, values, laws and numbers of copies. Some
-of these have one of the faults above, a wrong index or an unknown name. Each accepted model is written as one flat
-file, and this file must give the same model. Each refusal must have a file, a message and a remedy.
+Each model has up to five parts from two other files, with random connections, values, laws and numbers of copies.
+Some models have one of the faults above, a wrong index or an unknown name. Each accepted model is also written as
+one file without parts. This file must give the same model. If a model is refused, the error must name the file, the
+fault and a remedy.
 
 | ending | models |
 | --- | --- |
@@ -120,9 +122,9 @@ file, and this file must give the same model. Each refusal must have a file, a m
 
 ## Command lines
 
-Each command line is a correct command to which one to a few changes are applied. A word is lost, doubled, moved,
-misspelt or replaced. Values have the faults that are listed above. Some values are replaced by names of devices, of
-folders and of missing files. A command that runs longer than {commanded:g} seconds is interrupted as by Ctrl-C.
+Each command line is a correct command with one or more changes. A word is lost, doubled, moved, misspelt or
+replaced. Values have the same faults as in model files. Some values are replaced by names of devices, of folders
+and of missing files. A command that runs longer than {commanded:g} seconds is interrupted as by Ctrl-C.
 
 | ending | command lines |
 | --- | --- |
@@ -142,9 +144,9 @@ These results are faults: an exception, a warning, an undocumented exit code, a 
 is not JSON under `--json`, and a hang.
 
 All faults that earlier runs found are fixed, and each has a test in `tests/fuzz/test_found.py`. Most faults were
-caused by numbers at the end of the range of floating-point numbers, whose square or quotient is infinite. In one
-fault the bound of a guard was not a number, so that the search for a zero never ended. In other faults a message
-contained a very long word. The tests run a few cases of each kind.
+caused by very large or very small numbers, whose squares or quotients are infinite. In one fault the bound of a
+guard was not a number, so that the search for a zero never ended. In other faults a message contained a very long
+word. The tests of the package also run a few random cases of each kind.
 """
 
 
