@@ -162,27 +162,30 @@ def study(count: int, seed: int = 1) -> dict[str, Tally]:
 HEAD = """# Is a zero of a guard ever lost?
 
 Does hybridsim ever miss a zero of a guard? Of {zeros} single zeros of {count} random guards, {missed} were missed.
-The tables below show how many pairs of zeros were found or reported.
+Two zeros may also be so close together that rounding decides whether they exist. The tables below count such pairs.
 
-`python docs/studies/guards.py` draws {count} random guards, half for `exact` and half for `taylor` (rtol {rtol:.0e}).
-It compares every mode change of the runs with an independent solution, which is called the oracle. The oracle has
-each guard g in closed form, for exactly the numbers that the run uses. It computes zeros and distances from zero in
-40 digits.
+`python docs/studies/guards.py` draws {count} random guards, half for `exact` and half for `taylor` (rtol
+{rtol:.0e}). It compares every mode change of the runs with an independent solution. This solution has each guard g
+in closed form, for exactly the numbers that the run uses. It computes zeros and distances from zero in 40 digits.
 
 A model has two modes. The guard of one mode is g, and the guard of the other mode is -g. Therefore the mode changes
-at each zero of g. The next segment of the run starts at this zero, with a guard that is zero by definition.
+at each zero of g. After the change, the guard of the new mode starts at zero. The run must not count this zero as
+another event.
 
-- For `exact` the guard g is a random combination of terms that linear modes can produce. These are polynomials
-  up to degree six, two waves, a damped driven oscillator, decays with waves, and t exp(-t) as a function of time.
-- For `taylor` the guard is a product of up to five factors with a zero. The factors are polynomial or
-  trigonometric, in t or in a state. The product is multiplied by positive functions. The model also has a
-  state with a nonlinear rate.
+- For `exact` the guard g is a random sum of terms that linear modes can produce. There are four kinds of guards:
+  polynomials up to degree six, sums of two sines, motions of a damped driven oscillator, and sums of two
+  exponentials, a sine and t exp(-e t).
+- For `taylor` the guard g is a product of factors, which have up to five zeros in all. The factors are polynomials
+  or trigonometric functions of t or of a state. Two further factors are positive. One of them depends on a state
+  with a nonlinear rate.
 
-Most guards have one or two *close extremes*. The distance of such an extreme from zero is called the depth. If g
-turns back after it has passed zero, there is a pair of zeros. If g turns back before it reaches zero, there is a
-near miss. The depths are spread evenly over the decades from 1e-17 to 1e-1 of the size of the guard. For `exact`
-the size is the largest sum of the absolute values of the terms. For `taylor` it is the largest value of the guard.
-Zeros closer than 1 % of the span count as a pair.
+Most guards have one or two minima or maxima close to zero. The distance of such an extreme value from zero is
+called the *depth*. If g turns back after it has passed zero, there is a *pair* of zeros. Two zeros closer than 1 %
+of the span count as a pair. If g turns back before it reaches zero, there is a *near miss*.
+
+Depths are relative to the *size* of the guard. For `exact` the size is the largest sum of the absolute values of
+the terms. For `taylor` the size is the largest value of the guard. The depths are spread evenly over the decades
+from 1e-17 to 1e-1.
 
 ## Zeros
 
@@ -190,12 +193,14 @@ Zeros closer than 1 % of the span count as a pair.
 | --- | --- | --- | --- | --- | --- | --- |
 """
 PAIRS = """
-A zero of a pair is *late* if its error exceeds {late:.0e} of the span, and also exceeds the effect of the error of
-the guard. The error of the guard is 1e-13
-of its size for `exact`, and a tenth of rtol for `taylor`. A single zero is *late* if its error exceeds 1e-10 of the
-span and 1e-10 of the size divided by the slope. If the error is more than ten times as large as these limits, the
-zero counts as missed. Its event counts as spurious. *Off by* is the error in time of single zeros, multiplied by
-the slope of the guard and divided by its size.
+A zero is *late* if the error of its event time exceeds a limit. The limit is the sum of two parts. For a single
+zero the first part is 1e-10 of the span, and the second part is 1e-10 of the size divided by the slope of the
+guard. For a zero of a pair the first part is {late:.0e} of the span, and the second part is the effect of an error
+of the guard. This error is 1e-13 of the size for `exact`, and a tenth of rtol times the size for `taylor`.
+
+If the error of a single zero is more than ten times its limit, the zero counts as *missed* and its event counts as
+*spurious*. The last column is for single zeros. It is the largest error of the event time, multiplied by the slope
+of the guard and divided by the size.
 
 ## Pairs, by depth over size
 
@@ -208,8 +213,8 @@ A pair is *found* if both zeros are found. It is *flagged* if no zero is found, 
 MISSES = """
 ## Near misses, by depth over size
 
-A near miss is *passed* if there is neither an event nor a report. It is *crossed* if the run has two events,
-although there is no zero.
+A near miss is *passed* if there is neither an event nor a report. It is *flagged* if a near-grazing is reported. It
+is *crossed* if the run has events, although the guard has no zero there.
 
 | depth | exact passed | flagged | crossed | taylor passed | flagged | crossed |
 | --- | --- | --- | --- | --- | --- | --- |
@@ -218,14 +223,14 @@ TAIL = """
 ## Error bounds
 
 The deepest pair that was only flagged has a depth of {exact:.1e} of the size for `exact`, and {taylor:.1e} for
-`taylor`. The compiled searches use these error bounds:
+`taylor`. The search for zeros in compiled code uses these bounds for the error of the guard:
 
 - For `exact` the bound is (16 + 2 J + 2 w s) 2^-53 of the size. J is the number of modal coordinates, w the largest
-  rate, and s the time since the last event. In this study the bound is about 4e-15.
+  absolute eigenvalue, and s the time since the last event. In this study the bound is about 4e-15.
 - For `taylor` the bound is 2 (|a_N| + |a_N-1|) + 8 2^-53 sum |a_k|. The a_k are the coefficients of the guard's
   series on the step. This bound is at most 6 rtol = {bound:.0e} of the largest value of the guard.
 
-No pair whose depth exceeds ten times the bound is lost. Every other pair {lost}.
+Every pair whose depth exceeds ten times the bound is found. Every other pair {lost}.
 
 Run `python docs/studies/guards.py [guards]` to repeat the study. It takes {minutes:.0f} minutes on one core.
 """
