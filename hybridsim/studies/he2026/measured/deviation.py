@@ -165,18 +165,20 @@ def claim(found: Maps, quantity: str, study: StepStudy) -> Claim:
     end = best["above 10 %"] or {"F0/N": math.nan, "r": math.nan}
     truly = readings[pair_name((closest.split("; ")[0], EXACT))]
     why = (
-        f"Our map also has a ridge of large values. The closest reading ({described(closest)}) has "
-        f"{_percent(best['maximum'])} at F0/N = {best['at'][0]:g}, r = {best['at'][1]:g}. It stays above 10 "
-        f"% up to F0/N = {end['F0/N']:g}, r = {end['r']:g}. {study.sentence(quantity)} Near the threshold "
-        f"(F0/N = {found.ratios[0]:g}, median over r) it is {_percent(best['near the threshold'])} in this "
-        f"reading, and {_percent(truly['near the threshold'])} compared with the exact motion. In the paper "
-        "the deviation decreases near the threshold."
+        f"Our map also has a ridge, along which {quantity}_D is large. The reading closest to the paper "
+        f"has {described(closest)}. In this reading the maximum of {quantity}_D is "
+        f"{_percent(best['maximum'])} at F0/N = {best['at'][0]:g}, r = {best['at'][1]:g}. Along the ridge "
+        f"{quantity}_D stays above 10 % up to F0/N = {end['F0/N']:g}, r = {end['r']:g}. "
+        f"{study.sentence(quantity)} Near the threshold of motion, at F0/N = {found.ratios[0]:g}, the "
+        f"median of {quantity}_D over r is {_percent(best['near the threshold'])} in this reading. It is "
+        f"{_percent(truly['near the threshold'])} if {quantity}2 is the value of the exact motion. In the "
+        f"paper {quantity}_D decreases towards the threshold."
     )
     text = (
         f"{quantity}_D is at least 10 % for F0/N from {_range_text(box10['F0/N'])} and r from "
-        f"{_range_text(box10['r'])}. {quantity}_D is at least 5 % for F0/N from "
-        f"{_range_text(box5['F0/N'])} and r from {_range_text(box5['r'])}. The maximum is "
-        f"{100 * published['maximum']:.2f} % at F0/N = {where[0]}, r = {where[1]}"
+        f"{_range_text(box10['r'])}. The claimed range with at least 5 % is F0/N from {_range_text(box5['F0/N'])} and "
+        f"r from {_range_text(box5['r'])}. The claimed maximum of {quantity}_D is {100 * published['maximum']:.2f} % "
+        f"at F0/N = {where[0]}, r = {where[1]}"
     )
     exact_rows = {name: row for name, row in readings.items() if name.endswith(EXACT)}
     return Claim(
@@ -186,7 +188,7 @@ def claim(found: Maps, quantity: str, study: StepStudy) -> Claim:
 
 
 def _percent(value: float) -> str:
-    return f"{100 * value:.3g} %"
+    return f"{float(f'{100 * value:.3g}'):g} %"
 
 
 def _range_text(ends: tuple[float, float]) -> str:

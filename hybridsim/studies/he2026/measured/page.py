@@ -8,7 +8,7 @@ from typing import Any
 
 from hybridsim.studies.he2026.measured.he2026 import Study
 from hybridsim.studies.he2026.measured.required_settings import EPS, STEPS
-from hybridsim.studies.he2026.measured.settings import SOURCE
+from hybridsim.studies.he2026.measured.settings import SOURCE, STEPS_PER_PERIOD
 from hybridsim.studies.he2026.measured.verdicts import Claim
 
 _PICTURES = {
@@ -26,25 +26,27 @@ _PICTURES = {
 _CAPTIONS = {
     "figure 3": "The upper panels show two periods of each reading and of the exact motion. The lower panels show"
     " the harmonics of x relative to the first harmonic.",
-    "figure 4": "Each line is a case. Solid lines are for different r, dashed lines for different N, and dotted "
-    "lines for different F0. The black line is for a point on the ridge of Figure 10.",
-    "figure 5": "The curves are the results of these cases over eps_v. The grey line is the published setting.",
-    "figure 6": "The left panel shows the run time. The right panel shows the number of evaluations, which other "
-    "programs on the machine do not change.",
-    "figure 7": "The grey mark shows the claim of +225 %.",
-    "figure 10": "The first two columns are for the published A2, with the velocity in stick kept and set to "
-    "zero. The last column is for the exact A2.",
-    "figure 11": "These are the maps of Figure 10 for the energy.",
-    "figure 12": "Without stick the force jumps between its limits. With v kept the body creeps in stick.",
-    "figure 13": "The body does not stick in this case, so all columns are equal.",
-    "text": "The deviation is of first order in the step. It tends to zero with the step, because the computed "
-    "motion tends to the motion with stick.",
+    "figure 4": "Each line is a case. Solid lines are for different r, dashed lines for different N, and "
+    "dotted lines for different F0. The black line is for F0/N = 0.55, r = 0.64, where the "
+    "map of Figure 10 has large values.",
+    "figure 5": (
+        "The curves show A and E of the same cases over eps_v. The vertical line marks the published eps_v."
+    ),
+    "figure 6": "The left panel shows the increase of the run time. The right panel shows the increase of "
+    "the number of evaluations of the right-hand side.",
+    "figure 7": "The grey mark shows the claimed increase of 225 %.",
+    "figure 10": "In the first two columns A2 is computed by the published method, with the velocity in "
+    "stick kept or set to zero. In the last column A2 is exact.",
+    "figure 11": "The maps correspond to those of Figure 10, with E_D in place of A_D.",
+    "figure 12": (
+        "Without stick the friction force jumps between its limits. If the velocity is kept in "
+        "stick, the body creeps."
+    ),
+    "figure 13": "The body never sticks in this case, so the motions in all columns are equal.",
+    "text": "The deviation of the method without stick is of first order in the step. For small steps the "
+    "computed motion approaches the motion with stick.",
 }
 _WIDTH = 120
-_PAIR = (
-    "In each pair of methods, the first is the method without stick. The second is the reading of the "
-    "method with stick."
-)
 
 
 def page(study: Study, image: Callable[[str], str]) -> str:
@@ -76,31 +78,37 @@ def _head(study: Study, claims: tuple[Claim, ...]) -> str:
     return f"""\
 # He et al. 2026, claim by claim
 
-When must a model include stick-slip? The map in the paper does not answer this question, because its values depend
-on the size of the step ({SOURCE}). For small steps, the motion that is computed without stick approaches the motion
-with stick. The values of the map therefore decrease with the step. The motion, the spectrum and the reduction to
-(r, F0/N) in the paper are right. The run times in the paper are those of one implementation.
+When must a model include stick-slip? The paper of He et al. answers this question by a map, but the values of the
+map depend on the size of the step ({SOURCE}). The map shows the deviation between a method without stick and a
+method with stick. For small steps, the motion that is computed without stick approaches the motion with stick. The
+values of the map therefore decrease with the step. In the paper the motion, its spectrum, and the reduction to two
+parameters are right. The run times in the paper are those of one implementation.
 
-This study computes every figure again with our implementation of the published method. It consists of
-`rk4-dichotomy`, and of `rk4-sign` for "stick-slip not considered". The paper leaves details of the method open. The
-study runs the method with each choice of these details, called a reading, and compares the results with the exact
-motion (`exact`). The sections after the claims give results that do not depend on a step. They show which motions
-stop, for how long, and how large the errors of models without stops are.
+The system is an oscillator with Coulomb friction and harmonic forcing (model `dfcs`). This study computes every
+figure of the paper again. The integrator `rk4-dichotomy` is our implementation of the published method with
+stick-slip. The integrator `rk4-sign` is our implementation of the method without stick-slip. The paper leaves
+details of the methods open. A *reading* is one choice of these details. The study compares the results of the
+readings with the exact motion, which `exact` computes. The sections after the claims give results that do not
+depend on a step. They show which motions stop, for how long, and how large the errors of models without stops are.
 
 | figure | claim | verdict |
 | --- | --- | --- |
 {rows}
 
-**Terms.** r is the frequency ratio omega/omega_n. A is half the range of x in a period, and E is the integral of
-x**2 over a period. A0 and E0 belong to the motion without friction. A1 and E1 belong to "stick-slip not considered"
-(`rk4-sign`), and A2 and E2 to stick-slip considered. A_D is
-|A1 - A2|/A2, and E_D is defined in the same way. The paper leaves these details of the dichotomy open:
+**Terms.** F0 is the amplitude of the forcing, N the normal load, and r the frequency ratio omega/omega_n. h0 is the
+number of steps per period T of the forcing. eps_v is the speed below which `rk4-dichotomy` treats the velocity as
+zero. A is half the range of x in a period, and E is the integral of x**2 over a period. A0 and E0 are the values of
+A and E without friction. A1 and E1 are the values of the method without stick (`rk4-sign`). A2 and E2 are the
+values of the method with stick (`rk4-dichotomy`). A_D is the deviation |A1 - A2|/A2, and E_D is defined in the same
+way. The paper leaves these details of the methods open:
 
 - *v kept* or *v zero*: in stick the velocity of the body is kept, or set to zero.
-- *release step* or *located*: the release is at the next step, or when the applied force reaches the limit.
+- *release step* or *located*: the release is at the next step, or at the instant at which the applied force reaches
+  the limit of friction.
 - *force by step* or *by stage*: the direction of friction is chosen once per step, or at each stage of RK4. For A1
   these choices are called *sign by step* and *sign by stage*.
-- *full-step* or *rest-of-step*: the step after an event is a full step, or the rest of the step of the event.
+- *full-step* or *rest-of-step*: the step after an event is a full step, or it ends where the interrupted step would
+  have ended.
 
 One command makes this page, its pictures and the [verdicts as data](he2026.json):
 `hybridsim study he2026{quick} --out FOLDER`."""
@@ -137,11 +145,9 @@ def _readings(study: Study) -> str:
         [
             "## Details that the paper leaves open",
             "",
-            "The table gives the error of the amplitude in per cent. This error is the mean over the last periods of a",
-            "run. The brackets give the least and the greatest value. Only one of the open details has a "
-            "large effect. This detail is the velocity in",
-            "stick, which Eq. 4 keeps at its value after the dichotomy. If the motion does not repeat, the amplitude",
-            "is a range.",
+            "The table gives the error of the amplitude in per cent, as the mean over the last periods of a run. The",
+            "least and the greatest error of these periods are in brackets. Only one of the open details has a large",
+            "effect: the velocity in stick. Eq. 4 of the paper keeps this velocity at its value after the dichotomy.",
             "",
             "| reading | " + " | ".join(columns) + " |",
             "| --- |" + " --- |" * len(columns),
@@ -159,22 +165,21 @@ def _truth(study: Study, image: Callable[[str], str]) -> str:
         [
             "## Results that hold for any step",
             "",
-            f"The exact steady motion was computed on {points[0]} x {points[1]} points. The difference "
-            "between the states at the beginning and at the end of a period is "
-            f"{facts['median residual of periodicity']:.0e} (median), and at most "
-            f"{facts['largest residual of periodicity']:.0e}. Den Hartog's boundary is a closed form that "
-            "separates",
-            f"points with stops from points without stops. {disagree} points are on the wrong side of this "
-            "boundary. At points without",
-            "stops, the closed form of the amplitude agrees with the run to",
-            f"{facts['largest deviation of the closed form where it holds']:.0e}. At low frequencies there are up to",
-            f"{facts['most stops per period']} stops per period.",
+            f"The exact steady motion was computed at {points[0]} x {points[1]} points (r, F0/N). The displacements at "
+            "the beginning and at the end of a period differ by "
+            f"{facts['median residual of periodicity']:.0e} of the amplitude in the median, and by "
+            f"{facts['largest residual of periodicity']:.0e} at most. A closed form by Den Hartog gives the boundary "
+            "between motions with stops and motions without stops. The exact motion disagrees with this boundary at "
+            f"{disagree} points. For motions without stops, Den Hartog's closed form of the amplitude agrees with the "
+            f"exact motion to {facts['largest deviation of the closed form where it holds']:.0e}. At low frequencies "
+            f"there are up to {facts['most stops per period']} stops per period.",
             "",
             f"![stick fraction, stops per period, amplitude]({image('stick')})",
             "",
-            "The simpler models are within 1 % of the exact amplitude on these shares of the moving points: "
+            "The amplitude of each simpler model is within 1 % of the exact amplitude at this share of "
+            "the points at which the body moves: "
             + ", ".join(f"{name} {_percent(share)}" for name, share in within.items())
-            + ". The last model needs no simulation. Its error is below 1 % if less than "
+            + ". Den Hartog's closed form needs no simulation. Its error is below 1 % if less than "
             + _percent(facts["stick fraction below which the closed form without stops is within 1 %"])
             + " of the period is stick, and below 5 % if less than "
             + _percent(facts["stick fraction below which the closed form without stops is within 5 %"])
@@ -199,11 +204,13 @@ def _required_settings(study: Study, picture: str) -> str:
         [
             "## Settings for an error of 1 %",
             "",
-            "The runs start on the exact orbit. A setting is sufficient if the amplitude of each of the last forty",
-            f"periods is within 1 % of the exact amplitude. The steps have h0 up to {STEPS[-1]}. The",
-            f"smallest eps_v is {EPS[-1]:.1e} m/s.",
+            "Which step and which eps_v are sufficient for an error of 1 %? The runs start on the exact periodic",
+            "motion. A setting is sufficient if the amplitude of each of the last forty periods is within 1 % of the",
+            f"exact amplitude. For the methods without stick, h0 is varied up to {STEPS[-1]}. For the methods with",
+            f"stick, eps_v is varied down to {EPS[-1]:.1e} m/s, with h0 = {STEPS_PER_PERIOD}.",
             "",
-            "| method | share of the map with enough at the published setting | share without enough at the finest |",
+            "| method | share of the map at which the published setting is sufficient | "
+            "share at which no setting is sufficient |",
             "| --- | --- | --- |",
             *rows,
             "",
@@ -226,13 +233,12 @@ def _timed_map(study: Study, picture: str) -> str:
             "## Run time of a whole map",
             "",
             f"The map has the steady amplitude and energy at {study.timed_map.side} x {study.timed_map.side} "
-            f"points. Each value is from a run of {facts['settling']}. All methods use the same",
-            "threads in the same run. The time includes all costs of a point. `exact` runs the whole map as one",
-            "`hs.sweep(..., after=100)`. The other methods run a random sample of the points, one by one, which adds a",
-            "millisecond per point. The errors in the table are those of this sample. The reference is the "
-            "exact motion after all changes have decayed to",
-            'rounding. The method "shooting" is `hs.steady_state`. It finds the orbit without a long run and also',
-            "determines its kind.",
+            f"points. Each value is from a run of {facts['settling']}. All methods use the same number of threads.",
+            "The time per point is the elapsed time divided by the number of points. `exact` runs the whole map as one",
+            "`hs.sweep(..., after=100)`. The other methods run only a random sample of the points, one by one. A",
+            "separate call takes about a millisecond more than a point of a sweep. All errors in the table are those",
+            "at the points of the sample. The reference is the exact steady motion.",
+            'The method "shooting" is `hs.steady_state`, which computes the periodic motion without a long run.',
             "",
             "| method | ms per point | points | median error of A | largest of A | of E | time, `exact` = 1 |",
             "| --- | --- | --- | --- | --- | --- | --- |",
@@ -248,10 +254,9 @@ def _how(study: Study) -> str:
         [
             "## Size of the study",
             "",
-            f"The study was run in its {study.size.name} size. Runs have {study.size.periods} periods from rest. "
-            "A and E are",
-            f"those of the last {study.size.last} periods. Without stick the motion does not repeat, so one",
-            f"period is not sufficient. {_PAIR} The study ran on {study.workers} threads.",
+            f"This page shows the {study.size.name} size of the study, on {study.workers} threads. Runs have "
+            f"{study.size.periods} periods from rest. A and E are means over the last {study.size.last} periods,",
+            "because without stick the periods are not equal.",
             "",
             "| part | seconds |",
             "| --- | --- |",

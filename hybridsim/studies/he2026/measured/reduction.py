@@ -138,18 +138,19 @@ def claim(found: Reduction) -> Claim:
     verdict = Verdict.REPRODUCED if both and to_rounding else Verdict.SHAPE if to_rounding else Verdict.NOT
     literal, stribeck = ours[paper.LITERAL.name], float(found.spread(STRIBECK).max())
     why = (
-        "With `exact` A, E and the stick fraction depend only on (r, F0/N), to "
-        f"{max(found.rounding.values()):.0e} over {_SAMPLES} points and three loads. Without stick A and E "
-        "also depend only on (r, F0/N), apart from the chatter. The reduction fails if eps_v or a law is "
-        f"given in m/s. With eps_v = 8e-4 and v kept, A/A0 varies by {100 * literal['spread of A/A0']:.2g} % "
-        f"over F0 = {FORCES[0]:g} to {FORCES[-1]:g} N. With a Stribeck velocity A/A0 varies by "
-        f"{100 * stribeck:.2g} %."
+        f"With `exact`, the results at {_SAMPLES} points were computed for three normal loads each. A/A0, "
+        "E/E0 and the stick fraction depend only on r and F0/N, apart from differences of at most "
+        f"{max(found.rounding.values()):.0e}. Without stick the same holds for A/A0 and E/E0, apart from "
+        "the chatter. The reduction fails if eps_v or a parameter of the law is a velocity in m/s. With "
+        f"eps_v = 8e-4 m/s and v kept, A/A0 varies by {100 * literal['spread of A/A0']:.2g} % between F0 = "
+        f"{FORCES[0]:g} N and {FORCES[-1]:g} N. With a Stribeck law, which contains a velocity, A/A0 "
+        f"varies by {100 * stribeck:.2g} %."
     )
     return Claim(
         "figures 8, 9",
         "8, 9",
-        "at fixed F0/N, A/A0 and E/E0 do not depend on F0, with and without stick. The "
-        "parameters (r, N, F0) therefore reduce to (r, F0/N)",
+        "at fixed F0/N, A/A0 and E/E0 do not depend on F0, with and without stick, so that the three "
+        "parameters r, N and F0 reduce to the two parameters r and F0/N",
         {"spread": "constant"},
         ours,
         closest,

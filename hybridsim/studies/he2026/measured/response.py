@@ -110,13 +110,16 @@ def claim_figure_3(runs: dict[str, Response]) -> Claim:
     why = (
         "The exact motion has the period of the forcing. The even harmonics of x are below "
         f"{exact['even']:.0e}. The third harmonic is {100 * third:.1f} % and the fifth harmonic "
-        f"{100 * fifth:.1f} % of the first. {len(keeps)} of the {len(ours)} readings of the method have "
-        "these harmonics with a difference of at most 0.1 %."
+        f"{100 * fifth:.1f} % of the first. {len(keeps)} of the {len(ours)} readings agree with these "
+        "harmonics to 0.1 %."
     )
     return Claim(
         "figure 3",
         "3",
-        "the motion has the period of the forcing and only odd harmonics of w. High harmonics are significant",
+        (
+            "the motion has the period of the forcing and only odd harmonics of omega, and its high harmonics "
+            "are significant"
+        ),
         {"period": "T", "harmonics": "odd", "high harmonics": "significant"},
         ours,
         min(ours, key=lambda name: ours[name]["even"] + ours[name]["between"]),
@@ -152,16 +155,20 @@ def claim_figure_12(runs: dict[str, Response], study: StepStudy) -> Claim:
     chatter = max(runs[v.name].jumps for v in paper.SIGNS)
     by_step, by_stage = (f"from {100 * row[first]:.2g} % to {100 * row[-1]:.2g} %" for row in falls.values())
     why = (
-        f"Without stick the force jumps between its limits, up to {chatter:.0f} times per period. The exact motion "
-        f"sticks for {100 * runs[EXACT].stick:.0f} % of the period. The closest reading ({paper.described(closest)}) "
-        f"has A_D = {100 * ours[closest]['A_D']:.1f} %. If h0 increases from {paper.STEPS_PER_PERIOD} to "
-        f"{STEPS[-1]}, the deviation from the exact motion decreases. It decreases {by_step} with sign by step, "
-        f"and {by_stage} with sign by stage."
+        f"Without stick the friction force jumps between its limits up to {chatter:.0f} times per period. "
+        f"In the exact motion the body sticks for {100 * runs[EXACT].stick:.0f} % of the period. The "
+        f"reading closest to the paper has {paper.described(closest)}. In this reading A_D is "
+        f"{100 * ours[closest]['A_D']:.1f} %. The method without stick deviates from the exact motion. If "
+        f"h0 increases from {paper.STEPS_PER_PERIOD} to {STEPS[-1]}, this deviation decreases {by_step} "
+        f"with sign by step, and {by_stage} with sign by stage."
     )
     return Claim(
         "figure 12",
         "12",
-        "A_D is 15 % at F0/N = 0.54, r = 0.55. Without stick the friction force jumps between its limits around v = 0",
+        (
+            "A_D is 15 % at F0/N = 0.54, r = 0.55, and the friction force without stick jumps between its "
+            "limits around v = 0"
+        ),
         {"A_D": 0.15},
         ours,
         closest,
@@ -181,14 +188,17 @@ def claim_figure_13(runs: dict[str, Response], figure_12: dict[str, Response]) -
     less = ours[closest]["A_D"] < before[closest]["A_D"]
     verdict = Verdict.REPRODUCED if near and less else Verdict.SHAPE if less else Verdict.NOT
     why = (
-        "The deviation is smaller than in Figure 12, as claimed, but no reading gives more than "
-        f"{100 * greatest:.2g} %. In this case the exact motion does not stick "
-        f"({100 * runs[EXACT].stick:.2g} % of the period), so a method without stick has no error."
+        "A_D is smaller than in Figure 12, as claimed, but no reading gives more than "
+        f"{100 * greatest:.2g} %. In the exact motion the body sticks for {100 * runs[EXACT].stick:.2g} % "
+        "of the period. A method without stick is therefore right in this case."
     )
     return Claim(
         "figure 13",
         "13",
-        "A_D is 2 % at F0/N = 0.80, r = 1.0. Less stick causes a smaller deviation",
+        (
+            "A_D is 2 % at F0/N = 0.80, r = 1.0, which is less than in figure 12 because the body sticks for "
+            "less time"
+        ),
         {"A_D": 0.02},
         ours,
         closest,

@@ -66,8 +66,9 @@ class StepStudy:
         values = [self.along(v.name, quantity) for v in SIGNS]
         by_step, by_stage = (f"from {100 * a[first]:.2g} % to {100 * a[-1]:.2g} %" for a in values)
         return (
-            f"If h0 increases from {STEPS_PER_PERIOD} to {STEPS[-1]}, the deviation from the exact motion "
-            f"along the ridge decreases. It decreases {by_step} with sign by step, and {by_stage} with sign by stage."
+            "Along the ridge the method without stick deviates from the exact motion. If h0 increases "
+            f"from {STEPS_PER_PERIOD} to {STEPS[-1]}, this deviation decreases {by_step} with sign by "
+            f"step, and {by_stage} with sign by stage."
         )
 
     def to_plain(self, quantity: str) -> dict[str, Any]:

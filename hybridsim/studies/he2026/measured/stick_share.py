@@ -37,18 +37,18 @@ def claim(maps: Maps, study: StepStudy, truth: Truth) -> Claim:
     stage = study.along(SIGNS[-1].name, "A")
     one, five = truth.harmless(0.01), truth.harmless(0.05)
     why = (
-        f"A_D grows with the stick fraction (rank correlation {ours[closest][key]:.2f}), but the step has an "
-        "equal influence. If only the step decreases, the stick fractions do not change, but A_D decreases "
-        f"from {100 * stage[first]:.2g} % to {100 * stage[-1]:.2g} %. Den Hartog's closed form for motions "
-        "without stops does not depend on a step. Its error depends only on the stick fraction. This error "
-        f"is below 1 % for stick fractions below {100 * one:.2g} %, and below 5 % for those below "
+        f"A_D grows with the stick fraction (rank correlation {ours[closest][key]:.2f}), but it also "
+        "depends on the step. If only the step decreases, the stick fractions do not change, but A_D "
+        f"decreases from {100 * stage[first]:.2g} % to {100 * stage[-1]:.2g} %. Den Hartog's closed form "
+        "assumes a motion without stops and needs no step. The error of its amplitude is below 1 % if the "
+        f"stick fraction is below {100 * one:.2g} %, and below 5 % if the stick fraction is below "
         f"{100 * five:.2g} %."
     )
     return Claim(
         "text",
         "",
-        "the stick fraction of the period determines the deviation. If this fraction is small, stick-slip "
-        "need not be considered",
+        "the deviation depends on the stick fraction, which is the share of the period in stick, and "
+        "stick-slip need not be considered if this fraction is small",
         {"deviation": "grows with the share of the period in stick"},
         ours,
         closest,
