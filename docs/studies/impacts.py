@@ -58,24 +58,26 @@ def main(total: int) -> None:
 
 TEXT = """# Do impacts gain energy?
 
-Does an impact ever add energy? In {count} random impacts, no impact with a single outcome adds energy beyond rounding.
-The largest gain is {most:.1e} of the kinetic energy of the change of velocities.
+Does an impact ever add energy? Of {count} random impacts, no impact with a single outcome adds energy beyond
+rounding.
 
-`docs/studies/impacts.py` draws random mechanisms of up to 7 coordinates with dense mass matrices. Up to 3 gaps
-close at the same instant or are closed before. Each gap has a restitution between 0 and 1. Friction acts in up to 2
-directions. In each of these directions the normal impulse is that of one gap. The coefficient of friction is
-between 0 and 1. Let u- and u+ be the rates before and after the impact. The work of the impulses P is the change of
-kinetic energy, P.(u- + u+)/2. The table gives this work relative to P.G P/2, which is the kinetic energy of the
-change of velocities.
+`docs/studies/impacts.py` draws random mechanisms of up to 7 coordinates with dense mass matrices. An impact has up
+to 3 gaps. At the instant of the impact each gap either closes, or is already closed. The coefficient of restitution
+of each gap is between 0 and 1. Up to 2 gaps also have friction, with a coefficient between 0 and 1.
+
+Let P be the impulses, and let u- and u+ be the relative velocities at the contacts before and after the impact. The
+change of kinetic energy is P.(u- + u+)/2. The table gives this change relative to P.G P/2, which is the kinetic
+energy of the change of velocities. The matrix G is defined by u+ - u- = G P. A gain is a positive change, and a
+loss is a negative change.
 
 | gaps | with friction | impacts | rebound reduced | several outcomes | none | largest gain | median loss |
 | --- | --- | --- | --- | --- | --- | --- | --- |
 {rows}
 
-Rounding errors grow with the condition number of G, which is up to 1e4 here. The column "rebound reduced" counts
-impacts in which Newton's law would add energy (Kane's paradox). A run with such an impact has a warning. With
-friction an impact may have several outcomes or no outcome. The run then ends with the status `nonunique` or
-`inconsistent`. See [impacts](../explanation/events.md#impacts).
+Rounding errors grow with the condition number of G, which is at most 1e4 here. The column "rebound reduced" counts
+impacts in which Newton's law of restitution would add energy (Kane's paradox). hybridsim then reduces the rebound,
+and the run has a warning. An impact with friction may have several outcomes or no outcome. The run then ends with
+the status `nonunique` or `inconsistent`. See [impacts](../explanation/events.md#impacts).
 """
 
 
