@@ -388,10 +388,10 @@ HEAD = """# Does a run depend on earlier runs?
 Does the result of a run depend on earlier runs in the same process? {compared} runs were made after other runs, and
 {differ} of them differ from the same run in a new process.
 
-`python docs/studies/history.py` makes runs of 100 models. They are the models of the package, three chains of blocks,
-and generated models that combine forms at random ([combined forms](combined-forms.md)). Ten of the generated models
-have more than {limit} combinations of modes. For such a model the process adds a combination to its tables when a run
-first reaches it. This page has the figures of {models} models, of which {many} has more than {limit} combinations.
+`python docs/studies/history.py` selects up to 100 models. They are the models of the package, three chains of
+blocks, and random models ([combined forms](combined-forms.md)). This page shows the results for {models} models, of
+which {many} has more than {limit} combinations of modes. For such a model the process keeps a table of the
+combinations that its runs have reached. Earlier runs therefore change this table.
 
 For each model one process makes {runs} other runs, in random order and by random integrators:
 
@@ -399,17 +399,20 @@ For each model one process makes {runs} other runs, in random order and by rando
 - A limit stops some runs. Some of the stopped runs are resumed.
 - An exception in the `progress` function ends some runs.
 - Some runs go backward in time.
-- Some runs are of another model, or of an equal model in another object.
+- Some runs use another model, or a second `Model` object with the same content.
 
-After 1, 30 and 1000 of these runs, the process makes the compared run with each integrator. After the 1000 runs it
-makes the compared run twice. It repeats the compared runs with an equal model in another object. Then all
-integrators make the compared runs at the same time, on one thread each. During this time two further threads make
-other runs.
+The *compared run* is a run of the model with its declared numbers. The same process makes it with each integrator,
+at these times:
 
-The reference is a run in a process that makes no other run and starts with an empty cache of compiled models.
-Another process makes the run with the cache of the {runs} runs. All results are compared bit for bit: the status,
-the message, the warnings, the events with the states before and after them, all steps, and the dense output at
-{points} times.
+- after a search for spans that need little run time ("after the search for spans"),
+- after 1, 30 and 1000 of the other runs, and once more after the 1000 runs ("again"),
+- after these runs, with a second `Model` object of the same content ("equal model"),
+- on one thread for each integrator at the same time, while two further threads make other runs ("on a thread").
+
+The reference is the same run in a new process, which makes no other run and starts with an empty cache of compiled
+models. The last column of the table is for a new process that uses the cache of the process with {runs} runs. All
+results are compared bit for bit: the status, the message, the warnings, the events with the states before and after
+them, all steps, and the dense output at {points} times.
 
 """
 
