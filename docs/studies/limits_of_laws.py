@@ -210,24 +210,24 @@ def page(found: dict[str, dict[str, np.ndarray]], every: list[Scene]) -> str:
 
 How fast does the motion with a regularized or spring-like friction law approach the motion with Coulomb's law? The
 order depends on the law and on the events of the motion. With `karnopp` the error is of order 2 at a release and of
-order 1 at a reversal. With a spring contact the error is only of order 1/2 at a reversal. The observed orders agree
-with theory.
+order 1 at a reversal. With the spring-like laws the error is only of order 1/2 at a reversal. The observed orders
+agree with theory.
 
-Each law has a small parameter. This is either a velocity v0 over which the friction force changes its sign, or the
-inverse of a contact stiffness. `python docs/studies/limits_of_laws.py` runs the reference model with mu_s = mu_k over
-{PERIODS} periods, and compares the motion with the closed form for the set-valued law. There are three scenes:
+Each law has a small parameter. For a regularized law it is the velocity v0 below which the friction force changes
+its sign. For a spring-like law it is the inverse of the contact stiffness. `python docs/studies/limits_of_laws.py`
+runs the oscillator `dfcs` with mu_s = mu_k over {PERIODS} periods. It compares the motion with a closed form of the
+motion with Coulomb's law. There are three scenes:
 
 | scene | forcing and start | time in stick | releases | reversals without stick |
 | --- | --- | --- | --- | --- |
 {about}
 
-The relative width e is v0 over the largest speed, or the deflection mu N/stiffness over the largest displacement.
- The error is the largest
-error of x over the run.
+The relative width e is v0 divided by the largest speed, or the deflection mu N/stiffness divided by the largest
+displacement. The error is the largest error of the displacement x during the run.
 
 ![Error over the width of a law, six laws in three scenes](../images/limits-of-laws.png)
 
-The table compares the theoretical and the observed order over the smallest decade of e.
+The table compares the theoretical order with the order that is observed in the smallest decade of e.
 
 | law | {heads} |
 | --- | {" | ".join(["---"] * (3 * len(every)))} |
@@ -242,10 +242,10 @@ dominates.
 | --- | --- | --- | --- |
 {forms}
 
-**Release.** Let s be the time since the applied force exceeded mu N, and let the applied force be mu N + r s. With the
-set-valued law m v = r s^2/2. Let d be the difference between mu N and the friction force of another law. Then m v' =
-r s + d. Near s = 0 there is an interval in which d and r s have the same order of magnitude. The error is the
-additional velocity at the end of this interval.
+**Release.** Let s be the time since the applied force exceeded mu N, and let the applied force be mu N + r s. With
+Coulomb's law the velocity v of the body with mass m is given by m v = r s^2/2. Let mu N - d be the friction force
+of another law. With this law m v' = r s + d. Near s = 0 there is an interval in which d and r s have the same order
+of magnitude. The error is the additional velocity at the end of this interval.
 
 - `tanh`: d = 2 mu N exp(-2 v/v0). Then v is of size v0, and s is of size v0^(1/2). The velocity also has a factor
   log(1/v0), because d must decrease from mu N to r s.
@@ -253,19 +253,19 @@ additional velocity at the end of this interval.
 - `dahl`, `lugre`: d = mu N exp(-sigma x/(mu N)), with the stiffness sigma. Then x is of size 1/sigma, s of size
   sigma^(-1/3) and v of size sigma^(-2/3). The damping of the bristles is sqrt(sigma_0 m) v d/(mu N), which is
   smaller than d by a factor of sigma^(-1/6).
-- `jenkins`: d = 0 when the force reaches mu N. The error comes from the vibration of the body on the spring, which
-  begins at each stop. The vibration causes slip when the applied force grows. At the release the vibration of x is
-  of size 1/k.
+- `jenkins`: d = 0 when the force reaches mu N. At each stop the body begins to vibrate on the spring of the
+  contact. This vibration causes the error, because its amplitude at the release is of size 1/k.
 - `karnopp`: the release is located exactly. At the stop before the release, the body sticks too early by the time
   v0/a, where a is its deceleration. The distance to the true position of the stop is v0^2/(2 a).
 
-**Reversal.** The friction force changes by 2 mu N. With the set-valued law the force changes at once.
+**Reversal.** The friction force changes by 2 mu N. With Coulomb's law this change is a jump.
 
-- `tanh`, `arctan`, `karnopp`: the change takes the time v0/a. The velocity has an error of the order of v0 during
-  this time. With `arctan` the change takes longer, and the integral of v0/(a s) over s is of size v0 log(1/v0).
-- `jenkins`, `dahl`, `lugre`: during the change the body moves by a distance of the size of 1/stiffness. From rest
-  and with a finite acceleration, this takes a time of the size of stiffness^(-1/2). The error of the velocity is of
-  this size too. If a body reverses without stick, a spring contact is therefore a poor model of Coulomb's law.
+- `tanh`, `arctan`, `karnopp`: the change takes the time v0/a, where a is the acceleration. The velocity then has an
+  error of size v0. With `arctan` the force approaches its limit slowly, like v0/(a s) after the time s. The
+  integral of this difference over s gives an error of size v0 log(1/v0).
+- `jenkins`, `dahl`, `lugre`: during the change the body moves by a distance of size 1/stiffness. The body starts
+  from rest with a finite acceleration, so this takes a time of size stiffness^(-1/2). The error of the velocity is
+  of the same size. If a body reverses without stick, a spring-like law is therefore a poor model of Coulomb's law.
 
 ## References
 
