@@ -211,10 +211,10 @@ TEXT = """# At which order does time stepping converge?
 At which order of the step does time stepping converge? All orders of `moreau` lie between {least:.2f} and
 {most:.2f}, in ten scenes with friction and impacts.
 
-`moreau` does not locate events, and has its own mode decisions. `python docs/studies/moreau.py` runs ten scenes with
-{levels} step sizes. Each step size is half of the previous one. The reference is `exact` or `taylor` at rtol 1e-11,
-which locate every event. The place of an impact within its step is random, so single errors scatter. Each error
-is therefore a mean over {neighbours} neighbouring step sizes.
+`moreau` does not locate events, and does not use the mode selection of the other integrators. `python
+docs/studies/moreau.py` runs ten scenes with {levels} step sizes. Each step size is half of the previous one. The
+reference is `exact` or `taylor` at rtol 1e-11, which locate every event. The place of an impact within its step is
+random, so single errors scatter. Each error is therefore a mean over {neighbours} neighbouring step sizes.
 
 ![Errors over the step](../images/moreau.png)
 
@@ -231,26 +231,35 @@ The order is the slope of the error over all steps.
 | --- | --- | --- | --- | --- | --- | --- | --- |
 {impacts}
 
-`dfcs` is of second order. In the step of a stop, the friction impulse removes exactly the momentum of the body. At a
-release the friction force does not jump, because static and kinetic friction are equal. At a reversal without a stop
-the body sticks for one step. This error is of first order (`free-decay`). A force that depends on the speed is
-evaluated at the end of the step. This error is of first order too (`belt`). The scenes have no grazing impacts. At
-a grazing impact the time of the impact, and therefore the error, depends on the square root of a parameter.
+In `dfcs` the errors are of second order. In the step of a stop, the friction impulse removes exactly the momentum
+of the body. At a release the friction force does not jump, because static and kinetic friction are equal. Other
+scenes have errors of first order, for these reasons:
 
-- *vibrating table*: a ball is thrown repeatedly. Each flight ends in an accumulation of bounces, and then in rest.
+- At a reversal without a stop the body sticks for one step, as in `free-decay`.
+- A friction force that depends on the speed is evaluated at the end of the step, as in `belt`.
+- The time of an impact is accurate to one step only, as in all scenes with impacts.
+
+No scene has a grazing impact. The time of a grazing impact depends on the square root of a parameter, so its error
+would be larger.
+
+The scenes with impacts have these motions:
+
+- *vibrating table*: a table throws a ball repeatedly. Each flight ends in an accumulation of bounces, after which
+  the ball rests on the table.
 - *thrown block*: each impact loads the friction contact. The block slides after the last impact, and then sticks.
-- *two balls*: one ball is above the other. The upper ball falls on the lower ball, which bounces.
+- *two balls*: one ball is above the other. The lower ball bounces, and the upper ball falls on it.
 - *pendulum*: the gap is nonlinear in all states. The pendulum bounces and comes to rest.
 - *shaken mass*: a mass moves between two stops. A spring connects the mass to a block that sticks and slips on a
   belt.
 
 ## Chains that collide
 
-`hs.chain_on_belt(n, gap={gap:g})` has n blocks of mass 1 on a belt. The friction of each block is 1/(1 + 3|v|).
-Springs connect neighbouring blocks. If a spring is compressed by {gap:g}, its blocks collide with e = 0.5. The run
-lasts {span:g} units of time in steps of {step:g}. Friction and impacts act on the same blocks, so each step solves
-one problem with n + (n - 1) contacts. A step counts as unsettled if its impulses did not converge to 1e-12 of the
-largest impulse. Times are on one core of a machine that also ran other programs.
+`hs.chain_on_belt(n, gap={gap:g})` has n blocks of mass 1 on a belt. The friction force of each block is 1/(1 +
+3|v|), where v is the slip velocity. Springs connect neighbouring blocks. If the spring between two blocks is
+compressed by {gap:g}, these blocks collide with the restitution e = 0.5. The run lasts {span:g} units of time in
+steps of {step:g}. Friction and impacts act on the same blocks, so each step solves one problem with n friction
+contacts and n - 1 gaps. A step counts as unsettled if its impulses did not converge to 1e-12 of the largest
+impulse. Times are on one core of a machine that also ran other programs.
 
 | n | status | unsettled | bounces | changes of mode | us per step | sweeps per step | least gap |
 | --- | --- | --- | --- | --- | --- | --- | --- |
@@ -260,10 +269,11 @@ largest impulse. Times are on one core of a machine that also ran other programs
 | --- | --- | --- | --- | --- | --- |
 {works}
 
-If theta = 1/2, the sum of all works in a step equals the gain of kinetic and elastic energy. The missing energy in
-the table is rounding. Friction and impacts do not add energy, because the sums of their works are negative. A
-contact becomes active in the first step in which its gap would close by the middle of the step. A gap may therefore
-become negative, by at most 1 - e/2 times the distance of a step. No gap in this study is below this limit.
+With the option `theta` = 1/2, the sum of all works in a step equals the gain of kinetic and elastic energy. The
+last column gives the error of this balance, relative to the work of the belt. It consists of rounding errors. The
+works of friction and impacts are negative, so neither of them adds energy. A contact becomes active in the first
+step in which its gap would close by the middle of the step. A gap may therefore become negative, by at most 1 - e/2
+times the distance that the two blocks approach in a step. Every gap in this study is above this limit.
 """
 
 
