@@ -35,21 +35,22 @@ METHODS: tuple[tuple[str, Method, Method], ...] = (
 )
 HEAD = """# The published methods at their own speed
 
-How much slower are the published methods in hybridsim than these methods written by hand for one system? hybridsim
-takes {least:.2f} to {most:.2f} times as long.
+How much slower are the published methods in hybridsim than the same methods written by hand for one system?
+hybridsim takes {least:.2f} to {most:.2f} times as long.
 
-`python docs/studies/published_speed.py` compares `rk4-dichotomy` and `rk4-sign` with versions for the system of the
-paper alone. numba compiles these versions (`docs/studies/rivals/published_rk4.py`).
+`python docs/studies/published_speed.py` compares the integrators `rk4-dichotomy` and `rk4-sign` with the methods of
+the [paper of He et al.](he2026.md), written by hand for the system of this paper. numba compiles the code that is
+written by hand (`docs/studies/rivals/published_rk4.py`).
 
-- The runs have 100 periods of 1200 steps, and the methods run in {turns} turns. {machine}
+- Each run has 100 periods of 1200 steps. In each of {turns} turns, every method runs once. {machine}
 - For hybridsim, the time is the processor time of `hs.simulate(..., keep="events")` and of reading the times and
-  states of all events. The method written by hand only records events.
+  states of all events. The code written by hand only records events.
 - Each turn gives one ratio of two times. The table gives the median of the ratios and, in brackets, the range of the
   middle 90 %.
-- If the velocity is set to zero in stick, the method written by hand computes no stages in stick. If the velocity is
-  kept, the friction force is e at every stage, as in Eq. 4 of the paper.
-- With `rk4-sign` the sign of the velocity changes in each step in which the body should stick. Rounding decides the
-  number of these changes.
+- If the velocity is set to zero in stick, the code written by hand computes no stages in stick. If the velocity is
+  kept, the friction force at every stage equals the applied force, as in Eq. 4 of the paper.
+- With `rk4-sign` the sign of the velocity changes in each step in which the body should stick. Rounding affects the
+  number of these changes, so the two numbers of events may differ.
 
 | method | scene | events, ours | by hand | median ms, ours | by hand | ratio |
 | --- | --- | --- | --- | --- | --- | --- |
