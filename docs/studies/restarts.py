@@ -65,65 +65,69 @@ def run_one(tally: Runs, seed: int, number: int, integrator: str) -> None:
 
 HEAD = """# Restarts on a guard
 
-Does a run start correctly on a guard after an event? Of {clear} clear restarts, {spurious} had a spurious event, and
-{missed} missed an event.
+Does a run start correctly on a guard after an event? Of {clear} restarts that rounding does not decide, {spurious}
+had a spurious event, and {missed} missed an event.
 
-`python docs/studies/restarts.py` makes random restarts on and near guards. It compares each restart with exact
-arithmetic for the same numbers, called the oracle. In each restart some
-quantities are zero by definition ([events](../explanation/events.md)). They are zero in the oracle too.
+After an event a new segment of the run starts, often at a state at which a guard is zero. hybridsim then decides
+whether this guard fires. `python docs/studies/restarts.py` makes random restarts on guards and near guards. An
+independent computation in exact arithmetic, called the oracle, decides each restart for the same numbers. In most
+restarts some quantities are zero by definition ([events](../explanation/events.md)). They are zero in the oracle
+too.
 
-A restart is *clear* if the first coefficient of the true series of the guard is more than twice the error bound of
-the engine. Coefficients that are zero by definition are skipped. The verdict on a clear restart must be the true
-verdict. All other restarts count as *inside the error bound*. They are counted separately and follow another rule.
-A coefficient within its bound counts as zero, and the next coefficient decides. If no coefficient decides, the
-verdict is "undecided at rounding", and the mode does not change.
+hybridsim computes the Taylor series of the guard, with an error bound for each coefficient. Coefficients that are
+zero by definition are skipped. A restart is *clear* if the true value of the first other coefficient is more than
+twice its error bound. For a clear restart the verdict of hybridsim must be the true verdict. All other restarts are
+*inside the error bound*, and follow another rule. A coefficient within its bound counts as zero, and the next
+coefficient decides. If no coefficient decides, the verdict is "undecided", and the mode does not change.
 
 ## Verdicts
 
-The recurrences of the engine give the series and the bounds. The true series are computed with integers of {bits}
-bits. The expressions and the state are random, with one structure for 500 draws. A constant is added to the guard.
-The value of the guard at the state is then zero to the last bit, or differs from zero by 1e-19 to 1. In three of
-ten restarts the rate of the guard is changed in this way too. The oscillator is described under "Whole runs". Its
-parameters vary over decades, and its time over up to 10^6 periods. Its applied force is at the limit of friction or
-very near to it.
+The oracle computes the true series with integers of {bits} bits. In the rows "expression" the guard is a random
+expression at a random state. Each expression is used for 500 sets of numbers. A constant is added to the guard, so
+that its value is zero to the last bit, or differs from zero by 1e-19 to 1. In three of ten restarts the rate of the
+guard is changed in the same way.
+
+The other rows are for guards of the oscillator that is described under "Whole runs". Its parameters vary over
+decades, and the time of the restart over up to 10^6 periods. The applied force is at the limit of friction or very
+near to it.
 
 | restart | judged | clear | spurious | missed | inside, decided | undecided | against the rule | error/bound |
 | --- | --- | --- | --- | --- | --- | --- | --- | --- |
 """
 SEARCHES = """
-A restart is *spurious* if the engine finds that the guard fires, but the oracle does not. It is
-*missed* in the opposite case. *Inside, decided* means that the first coefficient is within its bound, so that a
-higher derivative decides. The last column is the largest error of a coefficient of the engine, divided by its
-bound. The bounds are valid if this quotient is below 1.
+A restart is *spurious* if the engine finds that the guard fires, but the oracle does not. It is *missed* in the
+opposite case. *Inside, decided* means that the first coefficient is within its bound, so that a higher derivative
+decides. The last column is the largest error of a computed coefficient, divided by its bound. The bounds are valid
+if this quotient is below 1.
 
 ## Searches
 
 A search finds the first zero of a function after the restart. The functions are random polynomials of up to degree
 8 with 0 to 5 zeros. Some zeros are very near to the restart, and some zeros form close pairs. The first 0 to 3
-coefficients are zero by definition, but contain small random errors. The oracle counts zeros by Sturm's method in
-integers.
+coefficients are zero by definition, but the computed coefficients contain small random errors. The oracle counts
+zeros by Sturm's method in integers. The columns "stays" and "leaves" count searches without and with a zero.
 
 | zero by definition | searches | stays | leaves | spurious | missed | open | open without reason | start inside |
 | --- | --- | --- | --- | --- | --- | --- | --- | --- |
 """
 RUNS = """
-A search is *open* if the function may be zero at some time, because it is within its error bound.
-The general method, which samples the guard, then searches again. *Start inside* means that the leading coefficient
-at the start is within its bound.
+A search is *open* if the computed function is at some time within its error bound, so that it may be zero there.
+Another method, which samples the guard, then searches again. *Start inside* means that the leading coefficient at
+the start is within its bound.
 
 ## Whole runs
 
-A mass that sticks is released, slips, and sticks again. A run has {periods} periods of a random oscillator from a
-random time, at rtol 1e-8. It is compared with the closed form. There are four kinds of oscillators. In the first kind
-mu_s = mu_k. In the second kind mu_s is greater than mu_k. In the third kind mu_s is greater than mu_k by a relative
-1e-14 to 1e-2. The fourth kind has no damping.
+A run has {periods} periods of a random forced oscillator with friction, at rtol 1e-8. It begins at a random time.
+The mass sticks, is released, slips, and sticks again. Each run is compared with a closed form. There are four kinds
+of oscillators. In the first kind mu_s = mu_k. In the second kind mu_s is greater than mu_k. In the third kind mu_s
+is greater than mu_k by only a relative 1e-14 to 1e-2. The fourth kind has no damping.
 
 | integrator | runs | mode changes | releases | spurious | missed | late | cut short | with a warning |
 | --- | --- | --- | --- | --- | --- | --- | --- | --- |
 """
 TAIL = """
 An event is *late* if its error exceeds 1e-5 of a period. A slip after a release is *cut short* if it lasts less
-than half of its true duration. The cause is then a wrong direction of slip.
+than half of its true duration, for instance because its direction is wrong.
 
 Run `python docs/studies/restarts.py [restarts]` to repeat the study. It takes {minutes:.0f} minutes on one core.
 """
