@@ -148,14 +148,15 @@ def page(
     return f"""# Limits of fixed steps and of zones around zero velocity
 
 How long may a fixed step be, and how wide may a zone around zero velocity be? In the two systems of this study,
-`rk4-dichotomy` needs 250 steps per period and a zone of at most 0.5 % of the largest speed. The velocity is then
-set to zero in stick. The table below has the values for all methods.
+`rk4-dichotomy` needs 250 steps per period and a zone of at most 0.5 % of the largest speed. These values hold if
+the method sets the velocity to zero in stick. The table below has the values for all methods.
 
-The user chooses the step h and the width of a zone around v = 0, in which the velocity counts as zero. The width of
-the zone is eps_v of `rk4-dichotomy`, or v0 of a regularized law. `python docs/studies/stability.py` measures the
-limits of step and zone. The two systems are the reference model (`dfcs`, at several r and F0/N) and the block on a
-`belt`. The case r = 0.6 with F0/N = 0.75 is P1 of the [comparison](../explanation/comparison.md), and r = 0.64 with
-F0/N = 0.55 is P2.
+For these methods you choose the step h, and the width of a zone around v = 0 in which the velocity counts as zero.
+The width of the zone is eps_v of `rk4-dichotomy`, or v0 of a regularized law. `python docs/studies/stability.py`
+measures the limits of step and zone. The two systems are the reference model `dfcs` and the block on a `belt`.
+`dfcs` has several values of the frequency ratio r = omega/omega_n, and of the ratio F0/N of the forcing to the
+normal load. The case r = 0.6 with F0/N = 0.75 is P1 of the [comparison](../explanation/comparison.md), and r = 0.64
+with F0/N = 0.55 is P2.
 
 Each run starts on the exact steady motion. `exact` computes this motion for the reference model, and `steady_state`
 for the belt. The run lasts 40 periods, of which the last 10 are evaluated. With Karnopp's band the run lasts 12
@@ -166,9 +167,9 @@ period. The width of a zone is given as a share of the largest relative speed.
 ## Recommended values
 
 These values hold for the two systems of this study. One system is a body on a spring with Coulomb friction and
-harmonic forcing. The other is a block on a belt with friction that decreases with the speed. Other systems may need a
-narrower zone. Examples are a body that drifts, static friction above kinetic friction, and several contacts. For
-such a system, compare a run with a run in a zone of half the width. This page does not cover impacts.
+harmonic forcing. The other is a block on a belt with friction that decreases with the speed. Other systems may need
+a narrower zone. Examples are a body that drifts, static friction above kinetic friction, and several contacts. For
+such a system, compare a run with a second run whose zone has half the width. This page does not cover impacts.
 
 | method | zone, as a share of the largest speed | steps per period, at least | beyond |
 | --- | --- | --- | --- |
@@ -178,14 +179,15 @@ such a system, compare a run with a run in a zone of half the width. This page d
 | RK4 with mu N tanh(v/v0) | v0 at most 0.05 % | h < 2.785 m v0/(mu N): 5000 to 50 000 here | creep; chatter |
 | RK4 with Karnopp's dead band | v0 at most 1 % | 50 | early stops, late starts |
 
-If the largest speed is 0.1 m/s, a share of 0.5 % is eps_v = 5e-4 m/s. Options are speeds in the unit of the model.
+The option `eps_v` is a speed in the unit of the model. If the largest speed is 0.1 m/s, a share of 0.5 % is eps_v =
+5e-4 m/s:
 
     hybridsim run dfcs --integrator rk4-dichotomy --option eps_v=5e-4 \\
         --option stick_velocity=zero --option steps_per_period=500
 
 `stick_velocity=kept` selects the method in the row with the kept velocity. `model.regularized("tanh", v0=5e-5)` and
-`model.regularized("karnopp", v0=5e-4)` are the regularized laws, for `rk4-sign` or any other integrator. Static
-friction must not be larger than kinetic friction if you use tanh. A model with larger static friction is an error.
+`model.regularized("karnopp", v0=5e-4)` are the regularized laws, for `rk4-sign` or any other integrator. The law
+`tanh` supports only models whose static friction does not exceed kinetic friction. Other models raise an error.
 
 You do not know the largest speed in advance. It is small just above the threshold of motion, and a zone then causes
 the largest errors. Run the model once, read the largest speed, and compare the zone with it. Near the threshold (F0/N
@@ -196,25 +198,26 @@ the largest errors. Run the model once, read the largest speed, and compare the 
 
 ![Error of the reference model over step and zone, four methods](../images/stability-dfcs.png)
 
-*`dfcs`, F0 = 30 N, r = 0.6. Runs are right below the black line and to its right.*
+*`dfcs`, F0 = 30 N, r = 0.6. Correct runs are below the black line and to the right of it.*
 
 ![Error of the belt over step and zone, four methods](../images/stability-belt.png)
 
-*`belt`, with the period T = 12.0010 of its limit cycle. The star marks the width 8e-4 m/s, as a share of the
-largest speed in the picture above.*
+*`belt`, with the period T = 12.0010 of its limit cycle. In the picture above the star marks the published width of
+8e-4 m/s.*
 
-The table gives a width. All zones up to this width are right. The last column gives 8e-4 m/s as a share of the
-largest speed.
+The table gives the largest width up to which all runs are right. The last column gives the published width of 8e-4
+m/s as a share of the largest speed.
 
 | case | zeroed: eps_v | kept: eps_v | tanh: v0 | karnopp: v0 | 8e-4 m/s |
 | --- | --- | --- | --- | --- | --- |
 {zones}
 
 These runs have 2000 steps per period, and 20000 with tanh. "None" means that the error exceeds 1 % at the smallest
-width at which RK4 is stable. Narrower zones are right although the velocity chatters, as the picture below shows.
+width at which RK4 is stable. With tanh, runs in still narrower zones may be right although the velocity chatters,
+as the picture below shows.
 
-The next table is for a zone with a third of the width in this table. It gives the number of steps per period above
-which all runs are right.
+The next table gives the number of steps per period above which all runs are right. Here the zone has a third of the
+width in the table above.
 
 | case | {heads} |
 | {rule} |
@@ -222,26 +225,27 @@ which all runs are right.
 
 ## The published setting
 
-The published setting is a step of T/1200 and a zone of 8e-4 m/s (v0 for tanh and Karnopp's band). The table gives the
-error of the amplitude, and the number of any additional stops per period. The result of `rk4-dichotomy` depends on
-the place of a stop within a step. Each value is therefore the worst of {OFFSETS} runs, whose starts are shifted by
-equal parts of a step. All other results of this page are from one run each.
+The published setting is a step of T/1200 and a zone of 8e-4 m/s (v0 for tanh and Karnopp's band). The table gives
+the error of the amplitude. If a run has additional stops, the table also gives their number per period. The result
+of `rk4-dichotomy` depends on the place of a stop within a step. Each value is therefore the worst of {OFFSETS}
+runs, whose starts are shifted by equal parts of a step. All other results of this page are from one run each.
 
 | case | {heads} |
 | {rule} |
 {published}
 
-If the velocity is set to zero, the published setting is right in every case. Its zone is then at most 4 % of the
-largest speed, and 11 % would also be right. If the velocity is kept, as in Eq. 4 of the paper, the setting is right
-for a body that never sticks. It is also right for r = 0.6 with F0/N = 0.75 and above. It is wrong in every other
-case. The error grows towards the threshold. The ridge of the map in the paper is there. For tanh with
-v0 = 8e-4 m/s, the result is wrong in half of the cases. The dichotomy needs only a fifth of the 1200 steps. If the
-zone is too wide, more steps do not help. `rk4-sign` may need ten times as many steps.
+If the velocity is set to zero, the published setting is right in every case. Its zone is at most 4 % of the largest
+speed. In the case with 4 %, even 11 % would be right. If the velocity is kept, as in Eq. 4 of the paper, the
+setting is right for a body that never sticks. It is also right for r = 0.6 with F0/N = 0.75 and above. It is wrong
+in every other case. The error grows towards the threshold of motion, where the map of the paper has its largest
+values. For tanh with v0 = 8e-4 m/s, the result is wrong in half of the cases. The dichotomy needs only a fifth of
+the 1200 steps. If the zone is too wide, more steps do not help. `rk4-sign` may need ten times as many steps as the
+published setting.
 
 ![How the boundary moves with r and F0/N](../images/stability-moves.png)
 
-*On each line the error of the amplitude is 1 %. At some points near the largest speed there are two lines, one
-above the other. The error of tanh changes its sign between them, so the result there is right by accident.*
+*On each line the error of the amplitude is 1 %. For some zones nearly as wide as the largest speed, tanh has two
+lines, one above the other. Between these lines the error changes its sign, so a run is right there by accident.*
 
 If the velocity is set to zero, the limit of the zone is an almost constant share of the largest speed. It is 9 to 15 %
 if the body sticks, and 1 to 2 % if the body only reverses. If the velocity is kept, the limit is 0.2 to 0.8 %, and
@@ -258,16 +262,16 @@ maps the place of a stop to the place of the next stop. G_x is the derivative of
 the derivative of G with respect to an outward speed at the release.
 
 **Velocity set to zero, zone too wide.** Stops are too early. If a body stops at the speed eps_v, its way to the
-stop is too short by eps_v^2/(2 a). This happens at every stop. The limit is therefore at eps_v^2/(2 a) = 0.01 X (1
-- G_x). On the belt the extreme of x is reached before the stop, when the relative speed is that of the belt. There
-  the limit is at (eps_v - v_belt)^2/(2 a) = 0.02 X. This formula gives 41 % of V, and the measured limit is 36 %.
-  If eps_v is above V, the body sticks as soon as the applied force permits stick. This false stick causes an error
-  of the amplitude of 75 %.
+stop is too short by eps_v^2/(2 a). This error occurs at every stop, and an error of the amplitude of 1 % is reached
+at eps_v^2/(2 a) = 0.01 X (1 - G_x). On the belt the extreme of x is reached before the stop, when the relative
+speed is that of the belt. There the limit is at (eps_v - v_belt)^2/(2 a) = 0.02 X. This formula gives 41 % of V,
+and the measured limit is 36 %. If eps_v is above V, the body sticks as soon as the applied force permits stick.
+This false stick causes an error of the amplitude of 75 %.
 
-**Velocity kept, zone too wide.** The body creeps in stick. It moves at up to eps_v when it should stick, by the
-distance d = eps_v t_stick. It then begins its slip with the speed eps_v in the wrong direction. The limit of the
-zone is at eps_v (t_stick + (G_x t_stick + G_v)/(1 - G_x)) = 0.01 X. On the belt the friction decreases with the
-speed. A slip that begins with a wrong speed moves away from the true slip. The limit is therefore 0.34 %.
+**Velocity kept, zone too wide.** The body creeps in stick. When it should stick, it moves at up to eps_v by the
+distance eps_v t_stick. It then begins its slip with the speed eps_v in the wrong direction. The limit of the zone
+is at eps_v (t_stick + (G_x t_stick + G_v)/(1 - G_x)) = 0.01 X. On the belt the friction decreases with the speed. A
+slip that begins with a wrong speed moves away from the true slip. The limit is therefore 0.34 %.
 
 | case | early stop: theory | measured | creep: theory | measured | late release: theory, at most | measured |
 | --- | --- | --- | --- | --- | --- | --- |
@@ -275,32 +279,32 @@ speed. A slip that begins with a wrong speed moves away from the true slip. The 
 
 The theory of creep assumes that the kept velocity is eps_v. The actual velocity is between zero and eps_v.
 
-**No stop at all** (F0/N = 1 at r = 0.6, F0/N = 0.75 at r = 0.8). In the zone, Eq. 4 reverses the friction force to
-oppose the applied force e, before the body has reversed. The reversal is late by m eps_v (1/(e - mu N) - 1/(e + mu
-N)). This error is of first order in eps_v, and a zone of 1 % of V is already too wide. From 4 % of V on, the body
-sticks at the reversal (F0/N = 1).
+**No stop at all** (F0/N = 1 at r = 0.6, F0/N = 0.75 at r = 0.8). In the zone, Eq. 4 reverses the friction force
+before the velocity reverses, so that the friction force opposes the applied force e. The reversal of the velocity
+is then late by m eps_v (1/(e - mu N) - 1/(e + mu N)). This error is of first order in eps_v, and a zone of 1 % of V
+is already too wide. From 4 % of V on, the body sticks at the reversal (F0/N = 1).
 
-**Zone too narrow.** After 16 halvings the speed is up to a h/2^16 (dotted line). If the zone is narrower, the method
-continues with a speed outside of the zone. In the reference model this has no effect if the step is short enough.
-On the belt, with fewer than about 90 steps per period, sticks are missed.
+**Zone too narrow.** The dichotomy halves the step 16 times at most. Then the speed is up to a h/2^16 (dotted line).
+If the zone is narrower, the method continues with a speed outside of the zone. In the reference model this has no
+effect if the step is short enough. On the belt, with fewer than about 90 steps per period, sticks are missed.
 
 **Step too long.** Releases are late, and stops are missed. A release is placed at the end of its step. If the
-release is a whole step late, the slip ends at another place. The table gives the limit that follows ("late release:
-theory"). The measured limit is lower, because a release is rarely a whole step late. With fewer than 10 steps per
-period stops are missed. There are two causes. The velocities at both ends of a step have the same sign, or the
-state after the bisection is beyond the next release. On the belt a trial step beyond v = 0 still uses the friction
-law for the side before v = 0. This law, 1/(1
-+ delta v), has a pole at v = -1/delta. The step reaches the pole if h > 1/(delta a), which is the case with fewer
-than 55 steps per period. With fewer than about 30 steps the motion grows without bound.
+release is a whole step late, the slip ends at another place. The column "late release" of the table above gives the
+resulting limit. The measured limit is lower, because a release is rarely a whole step late. With fewer than 10
+steps per period stops are missed. There are two causes. The velocities at both ends of a step have the same sign,
+or the state after the bisection is beyond the next release. On the belt a trial step beyond v = 0 still uses the
+friction law for the side before v = 0. This law, 1/(1 + delta v), has a pole at v = -1/delta. The step reaches the
+pole if h > 1/(delta a), which is the case with fewer than 55 steps per period. With fewer than about 30 steps the
+motion grows without bound.
 
 **`rk4-sign`.** The velocity chatters. In place of stick, the velocity changes its sign in each step, with speeds up
 to 2 mu N h/m. The error of the amplitude is of first order in h. It is larger for smaller amplitudes.
 
-**tanh.** If v0 is too large, the body creeps. If v0 is too small, RK4 is unstable. A body that should stick creeps at
-v0 artanh(e/(mu N)). At v = 0 the law has its largest rate, mu N/(m v0). Classic RK4 is stable if its step h times
-this rate is at most 2.785 (dotted line). At smaller v0, below this line, the velocity chatters. The amplitude
+**tanh.** If v0 is too large, the body creeps. If v0 is too small, RK4 is unstable. A body that should stick creeps
+at v0 artanh(e/(mu N)). At v = 0 the law has its largest rate, mu N/(m v0). Classic RK4 is stable if its step h
+times this rate is at most 2.785 (dotted line). At smaller v0, below this line, the velocity chatters. The amplitude
 becomes wrong only at a still smaller v0. The friction force is bounded by mu N. For very small v0 the result is
-therefore the same as with `rk4-sign`, and the black line approaches its limit.
+therefore the same as with `rk4-sign`, and both methods need the same number of steps.
 
 An adaptive method chooses its own step. The table is for `dop853` at rtol = 1e-6 and the reference model.
 
