@@ -148,18 +148,18 @@ def page(rows: list[str], ratios: list[float]) -> str:
 How much longer does a run take if the same model runs again with other numbers? A call with a new value in `params`
 takes {min(ratios):.2f} to {max(ratios):.2f} times as long as a call with the old value.
 
-A loop over a parameter or a start calls `hs.simulate` with one structure and many sets of numbers. The structure is
-compiled and checked once. For new numbers the engine does four things:
+A loop may call `hs.simulate` for one model with many values of a parameter or of the start. hybridsim compiles and
+checks the structure of the model only once. For new numbers it does four things:
 
 - It repeats the checks that depend on the numbers.
 - It evaluates the parameters that are expressions of other parameters.
 - It determines the modes at the start in compiled code.
 - It computes the tables of linear modes.
 
-`python docs/studies/repeated_runs.py` writes this page. The table gives medians of processor time in one process, in
-which the kinds of calls alternate. A call is a run with `keep="events"`, and includes reading the times and states of
-all events. Each new value differs from the old value in the eighth digit, so the events do not change. A call "by
-name" passes the name of the model. It is compared with a call that passes the model as an object. {machine()}
+`python docs/studies/repeated_runs.py` writes this page. The table gives medians of processor time. In one process
+the kinds of calls alternate. A call is a run with `keep="events"`, and includes reading the times and states of all
+events. Each new value differs from the old value in the eighth digit, so the events do not change. A call "by name"
+passes the name of the model. It is compared with a call that passes the model as an object. {machine()}
 
 {table}
 

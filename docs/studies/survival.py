@@ -236,8 +236,8 @@ includes the times and states of all steps, the events with the states before an
 
 A sweep of {points} points runs in a separate process, and took {seconds:.1f} s without interruption. SIGKILL ended
 the process {kills} times at random times, and each time the sweep was started again. In {begun} cases the sweep had
-finished before the kill. It was then started again without a journal. Before a point is computed, it is written to
-a log file.
+finished before the kill, and was then started again without a journal. The process writes each point to a log file
+before it computes the point.
 
 | | |
 | --- | --- |
@@ -245,8 +245,8 @@ a log file.
 | points whose computation was begun more than once, over all kills | {lost} |
 | points begun again after one kill, at most | {most} |
 
-The journal is written after each group of points. A kill therefore loses the results of the current group. The sweep
-has one worker.
+A sweep writes its journal after each group of points. A kill therefore loses the results of the current group. The
+sweep of this study has one worker.
 """
 
 

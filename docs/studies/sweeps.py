@@ -103,11 +103,10 @@ def page(
             "# A sweep of 10^5 steady states",
             "",
             "Is a large sweep complete, and is it the same on a cluster? "
-            f"On threads and on a cluster the results of {count} points are {same}. "
-            "The tables below give the status of all points.",
+            f"On threads and on a cluster the results of {count} points are {same}.",
             "",
-            f"`python docs/studies/sweeps.py` runs `hs.sweep` of {', '.join(MEASURES)} of `dfcs`",
-            f"at {count} random points.",
+            f"`python docs/studies/sweeps.py` runs `hs.sweep` at {count} random points of the model `dfcs`.",
+            f"The measures of the sweep are {', '.join(MEASURES)}.",
             "F0/N is from 0.5 to 1.5, omega from 0.05 to 2 of the natural frequency, and c from 2 to 20 N s/m.",
             f"{machine()}",
             "",
@@ -115,7 +114,7 @@ def page(
             "| --- | --- | --- |",
             *rates,
             "",
-            "The comparison of the results includes every quantity and every status.",
+            "Every measure and every status is compared.",
             "",
             "## Memory",
             "",
@@ -128,8 +127,8 @@ def page(
             "",
             "## Points that cannot succeed",
             "",
-            "At three further points the parameters have values without a steady state. For each of these "
-            "points the sweep reports a status, and NaN as the result.",
+            "At three further points the model has no steady state. For each of these points the sweep "
+            "reports a status, and NaN as the result.",
             "",
             "| fault | status |",
             "| --- | --- |",
@@ -137,7 +136,7 @@ def page(
             "",
             "## Other points",
             "",
-            f"Of the other points these motions were found: {kinds}.",
+            f"The sweep finds these motions at the other points: {kinds}.",
             "",
             "| points | status |",
             "| --- | --- |",

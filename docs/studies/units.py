@@ -96,7 +96,8 @@ model](../how-to/check-units.md).
 
 The faults are drawn at random. There are three kinds:
 
-- *Another unit* means that a declaration gets a unit of another dimension, or of the same dimension in another size.
+- *Another unit* means that a declaration gets a unit of another dimension, or a unit of the same dimension and
+  another size.
 - *A factor left out* means that `a*b` becomes `a` or `b`, and `a/b` becomes `a`.
 - *A name exchanged* means that a name in an expression becomes another name of the model.
 
@@ -105,19 +106,20 @@ and exchanged names must have different units. The script has its own table of t
 no code with the check. These changes do not count:
 
 - The changed expression is a guard, monitor or surface that is a single product. Such an expression may have any unit.
-- Only a number remains, and a number has any unit that its place needs.
+- After the change, the expression is only a number. A number may have any unit.
 - Other checks refuse the changed model.
 
 A fault is found on the right line if the warning is on the line of the changed expression. For a changed
-declaration, the line of the declaration is right, and so is the line of each expression with this name. For a
-change in the law of a contact, the line of its load or of its arguments is right.
+declaration, the line of each expression with the declared name is right too. For a change in the law of a contact,
+the line of its load or of its arguments is right.
 """
 REASONS = """The faults were not found for these reasons:
 
-- The unit of an impact force is not declared. If `m` is left out of `-g + p/m`, the force p becomes an acceleration.
-  All units still agree, unless a contact force determines the unit of `p`. The unit of t in `thermostat` is not
-  declared either.
-- A number in a product may be a constant with a unit, as in `0.6*sqrt(k/m)`, `0.1*A*omega` and `w**2/2`.
+- The unit of an impact force is not declared. If `m` is left out of `-g + p/m`, `p` becomes an acceleration, and
+  all units still agree. An exception is a model in which a contact force determines the unit of `p`. The unit of t
+  in `thermostat` is not declared either.
+- A number in a product may be a constant with a unit, so any unit of the product is accepted. Examples are
+  `0.6*sqrt(k/m)`, `0.1*A*omega` and `w**2/2`.
 - If two expressions imply different units of a force, the warning may be on the line of the unchanged expression.
 """
 
