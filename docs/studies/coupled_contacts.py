@@ -114,13 +114,13 @@ combinations at some instants, because its test is not strict. The test treats v
 only two derivatives of the forces, and none for redundant sets of contacts.
 
 If static friction exceeds kinetic friction, several motions may be possible. hybridsim first assumes stick in all
-contacts that may stick, and then releases the contacts whose force exceeds the limit. The final states of two
-orders of declaration differ because of rounding.
+contacts that may stick. It then releases the contacts whose force exceeds the limit. The final states of two orders
+of declaration differ because of rounding.
 
 ## Work and energy
 
-The energy of a system is v.Mv/2 + q.Kq/2, with the coordinates q, the velocities v, the mass matrix M and the
-stiffness matrix K. The change of this energy over a run must equal the work of the applied forces minus the work of
+The energy of a system is v.Mv/2 + q.Kq/2. Here q are the coordinates, v the velocities, M the mass matrix and K the
+stiffness matrix. The change of this energy over a run must equal the work of the applied forces minus the work of
 dampers and friction. The column "residual" gives the error of this balance, relative to the energy that friction
 dissipates. Each work is an integral over the dense output of the run. A Gauss-Legendre quadrature with 20 nodes
 computes the integral over each step of the run.
@@ -129,7 +129,7 @@ computes the integral over each step of the run.
 | --- | --- | --- | --- |
 {energies}
 
-With the law `hyperbolic` the friction force depends on the speed, so the computed work contains the error of the
+With the law `hyperbolic` the friction force depends on the speed. The computed work then contains the error of the
 run at rtol {RTOL:g}. With the laws `coulomb` and `static-kinetic` the computed work has only rounding errors.
 """,
         encoding="utf-8",

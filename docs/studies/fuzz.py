@@ -140,8 +140,8 @@ Each case runs in a process that records what the case does:
   imported, the process records it.
 - An audit hook detects every file opened for writing, every new folder, every started program and every connection.
 
-These results are faults: an exception, a warning, an undocumented exit code, a failure without a message, output that
-is not JSON under `--json`, and a hang.
+An exception, a warning, an undocumented exit code, a failure without a message, and a hang are faults. Under
+`--json`, output that is not JSON is a fault too.
 
 All faults that earlier runs found are fixed, and each has a test in `tests/fuzz/test_found.py`. Most faults were
 caused by very large or very small numbers, whose squares or quotients are infinite. In one fault the bound of a

@@ -172,8 +172,8 @@ A model has two modes. The guard of one mode is g, and the guard of the other mo
 at each zero of g. After the change, the guard of the new mode starts at zero. The run must not count this zero as
 another event.
 
-- For `exact` the guard g is a random sum of terms that linear modes can produce. There are four kinds of guards:
-  polynomials up to degree six, sums of two sines, motions of a damped driven oscillator, and sums of two
+- For `exact` the guard g is a random sum of terms that linear modes can produce. The guards are polynomials up to
+  degree six, sums of two sines, or motions of a damped driven oscillator. A fourth kind is the sum of two
   exponentials, a sine and t exp(-e t).
 - For `taylor` the guard g is a product of factors, which have up to five zeros in all. The factors are polynomials
   or trigonometric functions of t or of a state. Two further factors are positive. One of them depends on a state
@@ -194,13 +194,13 @@ from 1e-17 to 1e-1.
 """
 PAIRS = """
 A zero is *late* if the error of its event time exceeds a limit. The limit is the sum of two parts. For a single
-zero the first part is 1e-10 of the span, and the second part is 1e-10 of the size divided by the slope of the
-guard. For a zero of a pair the first part is {late:.0e} of the span, and the second part is the effect of an error
-of the guard. This error is 1e-13 of the size for `exact`, and a tenth of rtol times the size for `taylor`.
+zero the first part is 1e-10 of the span. The second part is 1e-10 of the size divided by the slope of the guard.
+For a zero of a pair the first part is {late:.0e} of the span. The second part is the effect of an error of the
+guard. This error is 1e-13 of the size for `exact`, and a tenth of rtol times the size for `taylor`.
 
-If the error of a single zero is more than ten times its limit, the zero counts as *missed* and its event counts as
-*spurious*. The last column is for single zeros. It is the largest error of the event time, multiplied by the slope
-of the guard and divided by the size.
+If the error of a single zero is more than ten times its limit, the zero counts as *missed*. Its event then counts
+as *spurious*. The last column is for single zeros. It is the largest error of the event time, multiplied by the
+slope of the guard and divided by the size.
 
 ## Pairs, by depth over size
 

@@ -409,10 +409,10 @@ at these times:
 - after these runs, with a second `Model` object of the same content ("equal model"),
 - on one thread for each integrator at the same time, while two further threads make other runs ("on a thread").
 
-The reference is the same run in a new process, which makes no other run and starts with an empty cache of compiled
-models. The last column of the table is for a new process that uses the cache of the process with {runs} runs. All
-results are compared bit for bit: the status, the message, the warnings, the events with the states before and after
-them, all steps, and the dense output at {points} times.
+The reference is the same run in a new process. This process makes no other run, and starts with an empty cache of
+compiled models. The last column of the table is for a new process that uses the cache of the process with {runs}
+runs. All results are compared bit for bit. They are the status, the message, the warnings, the events with the
+states before and after them, all steps, and the dense output at {points} times.
 
 """
 

@@ -65,7 +65,7 @@ rounding.
 to 3 gaps. At the instant of the impact each gap either closes, or is already closed. The coefficient of restitution
 of each gap is between 0 and 1. Up to 2 gaps also have friction, with a coefficient between 0 and 1.
 
-Let P be the impulses, and let u- and u+ be the relative velocities at the contacts before and after the impact. The
+Let P be the impulses. Let u- and u+ be the relative velocities at the contacts before and after the impact. The
 change of kinetic energy is P.(u- + u+)/2. The table gives this change relative to P.G P/2, which is the kinetic
 energy of the change of velocities. The matrix G is defined by u+ - u- = G P. A gain is a positive change, and a
 loss is a negative change.

@@ -239,8 +239,8 @@ scenes have errors of first order, for these reasons:
 - A friction force that depends on the speed is evaluated at the end of the step, as in `belt`.
 - The time of an impact is accurate to one step only, as in all scenes with impacts.
 
-No scene has a grazing impact. The time of a grazing impact depends on the square root of a parameter, so its error
-would be larger.
+No scene has a grazing impact. The time of a grazing impact depends on the square root of a parameter. Its error
+would therefore be larger.
 
 The scenes with impacts have these motions:
 
@@ -257,9 +257,9 @@ The scenes with impacts have these motions:
 `hs.chain_on_belt(n, gap={gap:g})` has n blocks of mass 1 on a belt. The friction force of each block is 1/(1 +
 3|v|), where v is the slip velocity. Springs connect neighbouring blocks. If the spring between two blocks is
 compressed by {gap:g}, these blocks collide with the restitution e = 0.5. The run lasts {span:g} units of time in
-steps of {step:g}. Friction and impacts act on the same blocks, so each step solves one problem with n friction
-contacts and n - 1 gaps. A step counts as unsettled if its impulses did not converge to 1e-12 of the largest
-impulse. Times are on one core of a machine that also ran other programs.
+steps of {step:g}. Friction and impacts act on the same blocks. Each step therefore solves one problem with n
+friction contacts and n - 1 gaps. A step counts as unsettled if its impulses did not converge to 1e-12 of the
+largest impulse. Times are on one core of a machine that also ran other programs.
 
 | n | status | unsettled | bounces | changes of mode | us per step | sweeps per step | least gap |
 | --- | --- | --- | --- | --- | --- | --- | --- |
@@ -272,8 +272,9 @@ impulse. Times are on one core of a machine that also ran other programs.
 With the option `theta` = 1/2, the sum of all works in a step equals the gain of kinetic and elastic energy. The
 last column gives the error of this balance, relative to the work of the belt. It consists of rounding errors. The
 works of friction and impacts are negative, so neither of them adds energy. A contact becomes active in the first
-step in which its gap would close by the middle of the step. A gap may therefore become negative, by at most 1 - e/2
-times the distance that the two blocks approach in a step. Every gap in this study is above this limit.
+step in which its gap would close by the middle of the step. A gap may therefore become negative. Its size is then
+at most 1 - e/2 times the distance that the two blocks approach in a step. Every gap in this study is above this
+limit.
 """
 
 

@@ -39,8 +39,8 @@ How much slower are the published methods in hybridsim than the same methods wri
 hybridsim takes {least:.2f} to {most:.2f} times as long.
 
 `python docs/studies/published_speed.py` compares the integrators `rk4-dichotomy` and `rk4-sign` with the methods of
-the [paper of He et al.](he2026.md), written by hand for the system of this paper. numba compiles the code that is
-written by hand (`docs/studies/rivals/published_rk4.py`).
+the [paper of He et al.](he2026.md) These methods are written by hand for the system of this paper. The code that is
+written by hand is compiled by numba (`docs/studies/rivals/published_rk4.py`).
 
 - Each run has 100 periods of 1200 steps. In each of {turns} turns, every method runs once. {machine}
 - For hybridsim, the time is the processor time of `hs.simulate(..., keep="events")` and of reading the times and
@@ -50,7 +50,7 @@ written by hand (`docs/studies/rivals/published_rk4.py`).
 - If the velocity is set to zero in stick, the code written by hand computes no stages in stick. If the velocity is
   kept, the friction force at every stage equals the applied force, as in Eq. 4 of the paper.
 - With `rk4-sign` the sign of the velocity changes in each step in which the body should stick. Rounding affects the
-  number of these changes, so the two numbers of events may differ.
+  number of these changes. The two numbers of events may therefore differ.
 
 | method | scene | events, ours | by hand | median ms, ours | by hand | ratio |
 | --- | --- | --- | --- | --- | --- | --- |

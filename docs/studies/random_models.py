@@ -147,15 +147,15 @@ allowed error.
 
 `python docs/studies/random_models.py` makes 200 random structures, and runs each structure with {draws} random sets
 of parameters and initial values. It compares every run with a reference at four times. Three of these times are
-between steps, as a test of the dense output, and the fourth is the end of the run.
+between steps, as a test of the dense output. The fourth is the end of the run.
 
 - There are 100 dense linear systems x' = A x + f phi(t) of one to eight states. There are six kinds of matrices A.
   A *generic* matrix has random elements. An *oscillatory* matrix causes about ten oscillations in a run. A
   *defective* matrix has fewer eigenvectors than states, and contains no rounding error. A *nearly defective* matrix
-  differs from a defective matrix by 1e-4 to 1e-15. A *stiff* matrix has a ratio of rates from 10 to 1e4, and a
-  *very stiff* matrix from 1e4 to 1e8. Only `exact` and `rodas5p` run systems of this last kind. The forcing phi is
-  zero, constant, a polynomial, an exponential, a sine, or t exp(-e t) cos(w t). The reference is a matrix
-  exponential in integers of {bits} bits.
+  differs from a defective matrix by 1e-4 to 1e-15. A *stiff* matrix has a ratio of rates from 10 to 1e4. For a
+  *very stiff* matrix this ratio is from 1e4 to 1e8. Only `exact` and `rodas5p` run systems of this last kind. The
+  forcing phi is zero, constant, a polynomial, an exponential, a sine, or t exp(-e t) cos(w t). The reference is a
+  matrix exponential in integers of {bits} bits.
 - There are 80 systems of one to four states with random smooth expressions (sums, products, quotients, roots, exp,
   sin, cos, tanh, atan). The reference is a Taylor series in integers, with about 18 correct digits.
 - There are 20 coupled stiff nonlinear systems of two to four states. The exact solution of each state is a sine. In
@@ -180,8 +180,8 @@ ORDERS = """
 ## Orders
 
 Twenty of the systems with smooth expressions run with fixed steps. The order is log2 of the ratio between the
-errors with the steps h and h/2. It is computed at the smallest h for which the errors are above 1e-13, so that
-rounding has no influence.
+errors with the steps h and h/2. It is computed at the smallest h for which the errors are above 1e-13. Rounding
+then has no influence.
 
 | integrator | order claimed | median observed | from | to |
 | --- | --- | --- | --- | --- |

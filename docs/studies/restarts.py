@@ -83,9 +83,9 @@ coefficient decides. If no coefficient decides, the verdict is "undecided", and 
 ## Verdicts
 
 The oracle computes the true series with integers of {bits} bits. In the rows "expression" the guard is a random
-expression at a random state. Each expression is used for 500 sets of numbers. A constant is added to the guard, so
-that its value is zero to the last bit, or differs from zero by 1e-19 to 1. In three of ten restarts the rate of the
-guard is changed in the same way.
+expression at a random state. Each expression is used for 500 sets of numbers. A constant is added to the guard. The
+value of the guard is then zero to the last bit, or differs from zero by 1e-19 to 1. In three of ten restarts the
+rate of the guard is changed in the same way.
 
 The other rows are for guards of the oscillator that is described under "Whole runs". Its parameters vary over
 decades, and the time of the restart over up to 10^6 periods. The applied force is at the limit of friction or very
@@ -111,9 +111,9 @@ zeros by Sturm's method in integers. The columns "stays" and "leaves" count sear
 | --- | --- | --- | --- | --- | --- | --- | --- | --- |
 """
 RUNS = """
-A search is *open* if the computed function is at some time within its error bound, so that it may be zero there.
-Another method, which samples the guard, then searches again. *Start inside* means that the leading coefficient at
-the start is within its bound.
+A search is *open* if the computed function is at some time within its error bound. The function may then be zero at
+this time. Another method, which samples the guard, searches again. *Start inside* means that the leading
+coefficient at the start is within its bound.
 
 ## Whole runs
 
@@ -127,7 +127,7 @@ is greater than mu_k by only a relative 1e-14 to 1e-2. The fourth kind has no da
 """
 TAIL = """
 An event is *late* if its error exceeds 1e-5 of a period. A slip after a release is *cut short* if it lasts less
-than half of its true duration, for instance because its direction is wrong.
+than half of its true duration. A possible cause is a wrong direction of slip.
 
 Run `python docs/studies/restarts.py [restarts]` to repeat the study. It takes {minutes:.0f} minutes on one core.
 """

@@ -151,12 +151,12 @@ How long may a fixed step be, and how wide may a zone around zero velocity be? I
 `rk4-dichotomy` needs 250 steps per period and a zone of at most 0.5 % of the largest speed. These values hold if
 the method sets the velocity to zero in stick. The table below has the values for all methods.
 
-For these methods you choose the step h, and the width of a zone around v = 0 in which the velocity counts as zero.
-The width of the zone is eps_v of `rk4-dichotomy`, or v0 of a regularized law. `python docs/studies/stability.py`
-measures the limits of step and zone. The two systems are the reference model `dfcs` and the block on a `belt`.
-`dfcs` has several values of the frequency ratio r = omega/omega_n, and of the ratio F0/N of the forcing to the
-normal load. The case r = 0.6 with F0/N = 0.75 is P1 of the [comparison](../explanation/comparison.md), and r = 0.64
-with F0/N = 0.55 is P2.
+For these methods you choose the step h and the width of a zone around v = 0. In this zone the velocity counts as
+zero. The width of the zone is eps_v of `rk4-dichotomy`, or v0 of a regularized law. `python
+docs/studies/stability.py` measures the limits of step and zone. The two systems are the reference model `dfcs` and
+the block on a `belt`. `dfcs` has several values of the frequency ratio r = omega/omega_n, and of the ratio F0/N of
+the forcing to the normal load. The case r = 0.6 with F0/N = 0.75 is P1 of the
+[comparison](../explanation/comparison.md). The case r = 0.64 with F0/N = 0.55 is P2.
 
 Each run starts on the exact steady motion. `exact` computes this motion for the reference model, and `steady_state`
 for the belt. The run lasts 40 periods, of which the last 10 are evaluated. With Karnopp's band the run lasts 12
@@ -262,11 +262,11 @@ maps the place of a stop to the place of the next stop. G_x is the derivative of
 the derivative of G with respect to an outward speed at the release.
 
 **Velocity set to zero, zone too wide.** Stops are too early. If a body stops at the speed eps_v, its way to the
-stop is too short by eps_v^2/(2 a). This error occurs at every stop, and an error of the amplitude of 1 % is reached
-at eps_v^2/(2 a) = 0.01 X (1 - G_x). On the belt the extreme of x is reached before the stop, when the relative
-speed is that of the belt. There the limit is at (eps_v - v_belt)^2/(2 a) = 0.02 X. This formula gives 41 % of V,
-and the measured limit is 36 %. If eps_v is above V, the body sticks as soon as the applied force permits stick.
-This false stick causes an error of the amplitude of 75 %.
+stop is too short by eps_v^2/(2 a). This error occurs at every stop. The error of the amplitude reaches 1 % at
+eps_v^2/(2 a) = 0.01 X (1 - G_x). On the belt the extreme of x is reached before the stop, when the relative speed
+is that of the belt. There the limit is at (eps_v - v_belt)^2/(2 a) = 0.02 X. This formula gives 41 % of V, and the
+measured limit is 36 %. If eps_v is above V, the body sticks as soon as the applied force permits stick. This false
+stick causes an error of the amplitude of 75 %.
 
 **Velocity kept, zone too wide.** The body creeps in stick. When it should stick, it moves at up to eps_v by the
 distance eps_v t_stick. It then begins its slip with the speed eps_v in the wrong direction. The limit of the zone
@@ -279,10 +279,10 @@ slip that begins with a wrong speed moves away from the true slip. The limit is 
 
 The theory of creep assumes that the kept velocity is eps_v. The actual velocity is between zero and eps_v.
 
-**No stop at all** (F0/N = 1 at r = 0.6, F0/N = 0.75 at r = 0.8). In the zone, Eq. 4 reverses the friction force
-before the velocity reverses, so that the friction force opposes the applied force e. The reversal of the velocity
-is then late by m eps_v (1/(e - mu N) - 1/(e + mu N)). This error is of first order in eps_v, and a zone of 1 % of V
-is already too wide. From 4 % of V on, the body sticks at the reversal (F0/N = 1).
+**No stop at all** (F0/N = 1 at r = 0.6, F0/N = 0.75 at r = 0.8). In the zone, Eq. 4 lets the friction force oppose
+the applied force e. The friction force therefore reverses before the velocity. The reversal of the velocity is late
+by m eps_v (1/(e - mu N) - 1/(e + mu N)). This error is of first order in eps_v, and a zone of 1 % of V is already
+too wide. From 4 % of V on, the body sticks at the reversal (F0/N = 1).
 
 **Zone too narrow.** The dichotomy halves the step 16 times at most. Then the speed is up to a h/2^16 (dotted line).
 If the zone is narrower, the method continues with a speed outside of the zone. In the reference model this has no
@@ -304,7 +304,7 @@ to 2 mu N h/m. The error of the amplitude is of first order in h. It is larger f
 at v0 artanh(e/(mu N)). At v = 0 the law has its largest rate, mu N/(m v0). Classic RK4 is stable if its step h
 times this rate is at most 2.785 (dotted line). At smaller v0, below this line, the velocity chatters. The amplitude
 becomes wrong only at a still smaller v0. The friction force is bounded by mu N. For very small v0 the result is
-therefore the same as with `rk4-sign`, and both methods need the same number of steps.
+therefore the same as with `rk4-sign`. Both methods then need the same number of steps.
 
 An adaptive method chooses its own step. The table is for `dop853` at rtol = 1e-6 and the reference model.
 

@@ -79,10 +79,10 @@ def _head(study: Study, claims: tuple[Claim, ...]) -> str:
 # He et al. 2026, claim by claim
 
 When must a model include stick-slip? The paper of He et al. answers this question by a map, but the values of the
-map depend on the size of the step ({SOURCE}). The map shows the deviation between a method without stick and a
-method with stick. For small steps, the motion that is computed without stick approaches the motion with stick. The
-values of the map therefore decrease with the step. In the paper the motion, its spectrum, and the reduction to two
-parameters are right. The run times in the paper are those of one implementation.
+map depend on the size of the step. The paper is {SOURCE}. The map shows the deviation between a method without
+stick and a method with stick. For small steps, the motion that is computed without stick approaches the motion with
+stick. The values of the map therefore decrease with the step. In the paper the motion, its spectrum, and the
+reduction to two parameters are right. The run times in the paper are those of one implementation.
 
 The system is an oscillator with Coulomb friction and harmonic forcing (model `dfcs`). This study computes every
 figure of the paper again. The integrator `rk4-dichotomy` is our implementation of the published method with
@@ -95,8 +95,8 @@ depend on a step. They show which motions stop, for how long, and how large the 
 | --- | --- | --- |
 {rows}
 
-**Terms.** F0 is the amplitude of the forcing, N the normal load, and r the frequency ratio omega/omega_n. h0 is the
-number of steps per period T of the forcing. eps_v is the speed below which `rk4-dichotomy` treats the velocity as
+**Terms.** F0 is the amplitude of the forcing, N the normal load, and r the frequency ratio omega/omega_n. The
+number of steps per period T of the forcing is h0. Below the speed eps_v, `rk4-dichotomy` treats the velocity as
 zero. A is half the range of x in a period, and E is the integral of x**2 over a period. A0 and E0 are the values of
 A and E without friction. A1 and E1 are the values of the method without stick (`rk4-sign`). A2 and E2 are the
 values of the method with stick (`rk4-dichotomy`). A_D is the deviation |A1 - A2|/A2, and E_D is defined in the same
@@ -146,8 +146,8 @@ def _readings(study: Study) -> str:
             "## Details that the paper leaves open",
             "",
             "The table gives the error of the amplitude in per cent, as the mean over the last periods of a run. The",
-            "least and the greatest error of these periods are in brackets. Only one of the open details has a large",
-            "effect: the velocity in stick. Eq. 4 of the paper keeps this velocity at its value after the dichotomy.",
+            "least and the greatest error of these periods are in brackets. Of the open details, only the velocity in",
+            "stick has a large effect. Eq. 4 of the paper keeps this velocity at its value after the dichotomy.",
             "",
             "| reading | " + " | ".join(columns) + " |",
             "| --- |" + " --- |" * len(columns),
@@ -165,10 +165,10 @@ def _truth(study: Study, image: Callable[[str], str]) -> str:
         [
             "## Results that hold for any step",
             "",
-            f"The exact steady motion was computed at {points[0]} x {points[1]} points (r, F0/N). The displacements at "
-            "the beginning and at the end of a period differ by "
-            f"{facts['median residual of periodicity']:.0e} of the amplitude in the median, and by "
-            f"{facts['largest residual of periodicity']:.0e} at most. A closed form by Den Hartog gives the boundary "
+            f"The exact steady motion was computed at {points[0]} x {points[1]} points (r, F0/N). In the median, "
+            "the displacements at the beginning and at the end of a period differ by "
+            f"{facts['median residual of periodicity']:.0e} of the amplitude. The largest difference is "
+            f"{facts['largest residual of periodicity']:.0e}. A closed form by Den Hartog gives the boundary "
             "between motions with stops and motions without stops. The exact motion disagrees with this boundary at "
             f"{disagree} points. For motions without stops, Den Hartog's closed form of the amplitude agrees with the "
             f"exact motion to {facts['largest deviation of the closed form where it holds']:.0e}. At low frequencies "

@@ -159,8 +159,8 @@ def claim_figure_12(runs: dict[str, Response], study: StepStudy) -> Claim:
         f"In the exact motion the body sticks for {100 * runs[EXACT].stick:.0f} % of the period. The "
         f"reading closest to the paper has {paper.described(closest)}. In this reading A_D is "
         f"{100 * ours[closest]['A_D']:.1f} %. The method without stick deviates from the exact motion. If "
-        f"h0 increases from {paper.STEPS_PER_PERIOD} to {STEPS[-1]}, this deviation decreases {by_step} "
-        f"with sign by step, and {by_stage} with sign by stage."
+        f"h0 increases from {paper.STEPS_PER_PERIOD} to {STEPS[-1]}, this deviation decreases. With sign by "
+        f"step it decreases {by_step}, and with sign by stage {by_stage}."
     )
     return Claim(
         "figure 12",

@@ -41,7 +41,7 @@ def claim(maps: Maps, study: StepStudy, truth: Truth) -> Claim:
         "depends on the step. If only the step decreases, the stick fractions do not change, but A_D "
         f"decreases from {100 * stage[first]:.2g} % to {100 * stage[-1]:.2g} %. Den Hartog's closed form "
         "assumes a motion without stops and needs no step. The error of its amplitude is below 1 % if the "
-        f"stick fraction is below {100 * one:.2g} %, and below 5 % if the stick fraction is below "
+        f"stick fraction is below {100 * one:.2g} %. The error is below 5 % if the stick fraction is below "
         f"{100 * five:.2g} %."
     )
     return Claim(
