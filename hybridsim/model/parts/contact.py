@@ -16,6 +16,8 @@ from hybridsim.model.parts.declared import Declared
 from hybridsim.model.parts.frozen_map import FrozenMap
 from hybridsim.model.parts.quantities import State
 
+_ZERO = parse(0)
+
 
 @dataclass(frozen=True)
 class Contact(Declared):
@@ -211,7 +213,7 @@ class Contact(Declared):
     def onset_force(self, backward: bool = False) -> Expression:
         """Return the magnitude of the force at the onset of slip, as an expression in names of the model."""
         slip = (self.law.slip_backward if backward else None) or self.law.slip
-        return self._at_rest(f"onset{backward}", slip, {SPEED: parse(0)})
+        return self._at_rest(f"onset{backward}", slip, {SPEED: _ZERO})
 
     def slip_force(self, speed: Expression, *, backward: bool = False) -> Expression:
         """Return the magnitude of the slip force at a speed >= 0, as an expression in names of the model."""
@@ -220,11 +222,14 @@ class Contact(Declared):
         return substitute(self._form("slip", slip=slip), {SPEED: speed, **self.values()})
 
     def slip_force_at(self, speed: float, backward: bool = False) -> Expression:
-        """Return the magnitude of the slip force at a numeric speed."""
+        """Return the magnitude of the slip force at a numeric speed; the force is computed once."""
         slip = (self.law.slip_backward if backward else None) or self.law.slip
         assert slip is not None  # always set in a set-valued law
-        names = {SPEED: parse(speed), **self.values()} | self._tables_at(speed, self.values())
-        return substitute(self._form("slip", slip=slip), names)
+        key = f"slip {speed} {backward}"
+        if key not in self._forces:
+            names = {SPEED: parse(speed), **self.values()} | self._tables_at(speed, self.values())
+            self._forces[key] = substitute(self._form("slip", slip=slip), names)
+        return self._forces[key]
 
     def _tables_at(self, speed: float, values: Mapping[str, Expression]) -> dict[str, Expression]:
         """Return the value of each table of the speed at a numeric speed."""
