@@ -116,7 +116,7 @@ def stepped(run: Run) -> Run:
 
 
 def advanced(position: Position, to: float, commit: Callable[[Position], None]) -> None:
-    """Advance to a later time and pass the position there to `commit`, or the position at the last event on failure."""
+    """Advance to a later time, and pass `commit` the position there, or at the last event if a step fails."""
     run, step = position.run, position.point.step(Instant(to))
     if isinstance(step, ResumePoint):
         commit(Position(run, step, position.warnings, position.events))

@@ -56,7 +56,7 @@ def zero_loads(system: System, t: float, x: np.ndarray) -> tuple[str, ...]:
 def _rounding(
     contact: Contact, system: System, meanings: Meanings, numbers: Mapping[str, float], t: float, load: float
 ) -> float:
-    """Return how much a load changes at most if the time and each number in it change by a rounding error."""
+    """Return the largest change of a load that rounding errors of the time and of its numbers can cause."""
     moved = [_load(contact, system, meanings, numbers, t * (1.0 + _SHIFT))]
     for name in meanings.depended_on(contact.normal.names) & numbers.keys():
         shifted = {**numbers, name: numbers[name] * (1.0 + _SHIFT)}

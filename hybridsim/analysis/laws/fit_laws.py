@@ -214,7 +214,7 @@ def _present(columns: Iterable[Mapping[str, np.ndarray]], name: str) -> np.ndarr
 
 
 def _off(found: Fit, records: tuple[Record, ...]) -> float:
-    """Return the root mean square of the residuals of records, each relative to the deviation of its quantity."""
+    """Return the root mean square of residuals, each divided by the standard deviation of its quantity."""
     residuals = Residuals(found.model, records, {}, found.settings)
     if not len(residuals.measured):
         raise UsageError("`held_out` contains no sample", remedy="use a record with measured values")

@@ -117,7 +117,7 @@ class SteadySensitivities(Readable):
         names = quantities_of(reading, quantities)
         if TIME in names:
             raise UsageError(
-                "the time t cannot be measured in a periodic motion, because it does not repeat",
+                "the time t cannot be measured in a periodic motion, because t does not repeat",
                 remedy="use periodic quantities",
             )
         over = self._over_time

@@ -65,7 +65,7 @@ def refuse_what_ends(system: System) -> None:
 
 
 def refuse_plain_time(system: System, period: float | None) -> None:
-    """Reject a declaration that contains t itself if it does not repeat with the period, or the period is unknown.
+    """Reject a declaration that contains t itself, if it does not repeat with the period or if the period is unknown.
 
     Raises
     ------

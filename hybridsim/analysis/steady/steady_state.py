@@ -377,7 +377,7 @@ class _Search:
         return bool((high - low <= rounding_of(sizes, self.motion.rtol)).all())
 
     def _other(self, passings: Passings) -> SteadyState:
-        """Classify a motion that does not repeat by its largest Lyapunov exponent."""
+        """Use the largest Lyapunov exponent to classify a motion that does not repeat."""
         base = self.period if self.period is not None else float(passings.times[-1] - passings.times[-2])
         # exponents need derivatives, which Python functions do not have
         has_slopes = system_of(self.motion.model).has_tape

@@ -39,7 +39,7 @@ def effort_of(options: Mapping[str, Any]) -> Effort | None:
 
 
 def can_be_compiled(system: System, options: Mapping[str, Any]) -> bool:
-    """Return whether compiled code can search the steady motions of a model from its own start.
+    """Return whether compiled code can search the steady motions of a model from the model's own start.
 
     options: those of `steady_state`. A period or a start, for example, needs the general search.
     """

@@ -127,7 +127,7 @@ class Carrier:
         return Carried(Y, Yd, times, self._off, self._lost, starts, shifts)
 
     def _ordinary(self, Y: np.ndarray, Yd: np.ndarray, G: np.ndarray) -> Carried | None:
-        """Carry derivatives from the start of the run to its end, or return None if an event is not ordinary."""
+        """Carry derivatives from start to end in compiled code; return None if an event of the run is not ordinary."""
         regular = self._flow.regular()
         if regular is None or not self._vector.is_fixed:
             return None

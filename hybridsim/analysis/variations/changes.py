@@ -61,7 +61,7 @@ class Changed:
         return np.asarray(np.abs(self.by) > _ALIKE * self.sizes)
 
     def along(self, rates: np.ndarray) -> float:
-        """Return the rate of the function for given rates of the states, or 0 if its terms cancel each other."""
+        """Return the rate of the function for given rates of the states, or 0 if the terms of this rate cancel."""
         return float(speed_along(self.row, self.by_time, rates))
 
 

@@ -123,7 +123,7 @@ def are_slow(steps: Steps, speeds: np.ndarray) -> bool:
 
 
 def in_parts(steps: Steps, speeds: np.ndarray, fastest: float) -> Steps:
-    """Divide steps so that they resolve eigenvalues of the sizes `speeds` (K,) and the fastest forcing."""
+    """Divide steps until they resolve the fastest forcing, and eigenvalues as large as `speeds` (K,)."""
     number, begins, ends = steps
     radians = (ends - begins) * np.maximum(speeds, fastest)
     if (radians <= _RADIANS).all():

@@ -55,7 +55,7 @@ def add_to(commands: Any) -> None:
         metavar="NAME=VALUES",
         nargs="+",
         type=values.assignment,
-        help="a parameter or state with its values; a state is varied in its initial value",
+        help="a parameter or state with its values; for a state, these are initial values",
     )
     options.add(
         parser,

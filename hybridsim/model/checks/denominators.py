@@ -46,7 +46,7 @@ class Denominator:
 
 
 def denominators(model: Model) -> tuple[Denominator, ...]:
-    """Return the denominators in rates that depend only on states, parameters and t, and may change their sign.
+    """Return those denominators in rates that may change their sign, and contain only states, parameters and t.
 
     Denominators inside a condition are omitted, because the condition may exclude the zero. Denominators that are never
     negative by their form are omitted too.

@@ -65,7 +65,7 @@ def jumps_of(model: Model) -> tuple[Caution, ...]:
 
 
 class _Flow:
-    """What moves the states of a model: facts that the readings of all its modes share."""
+    """The rates of the states of a model, with the facts that all its modes have in common."""
 
     def __init__(self, model: Model) -> None:
         self.model, self.components = model, model.all_components()

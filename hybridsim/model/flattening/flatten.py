@@ -34,7 +34,7 @@ KINDS = (
 
 
 def flattened(model: Model) -> dict[str, Any]:
-    """Return the declarations of a model and of all its parts, by the names of the attributes of a model.
+    """Return the declarations of a model and of all its parts, by the attribute of `Model` that contains them.
 
     Raises
     ------

@@ -52,7 +52,7 @@ class _Scanner:
         self.at = to
 
     def note(self, path: Path) -> None:
-        """Store the place of the last part of a key, unless it has a place already."""
+        """Store the place of the last part of a key, unless this part already has a place."""
         column = self.at - (self.text.rfind("\n", 0, self.at) + 1)
         self.found.setdefault(path, (self.line, column))
 

@@ -42,7 +42,7 @@ class Quantities:
         return self.units.get(TIME)
 
     def inference(self, counts: bool = False) -> Inference:
-        """Return an inference that uses these units and has no results yet."""
+        """Return a new inference of units, which begins with these units."""
         return Inference(self.units, self.parameters, counts)
 
     def rate(self, name: str) -> Unit | None:

@@ -169,7 +169,7 @@ def _short_numbers(svg: bytes) -> bytes:
 
 
 def as_svg(picture: Any) -> str:
-    """Return a picture as an SVG element, with its text as text, for a page of HTML."""
+    """Return a picture as an SVG element for a page of HTML; letters remain text instead of outlines."""
     drawn = BytesIO()
     with rc_context(_SVG):
         figure_of(picture).savefig(

@@ -56,7 +56,7 @@ def scenes() -> tuple[Scene, ...]:
 
 
 def tied() -> Scene:
-    """Return the test case of two contacts that reach their limits together, of which only one releases."""
+    """Return the test case of two contacts that reach their limits together; only one of them releases."""
     release, own, forced = math.asin(0.4) / 4, math.sqrt(30), 7.5 / 14
 
     def after(t: float) -> tuple[float, float]:

@@ -41,7 +41,7 @@ def _drum() -> Scene:
 
 
 def _discs() -> Scene:
-    """Return the test case of two discs, whose impact exchanges the velocity components along their centres."""
+    """Return the test case of two discs; their impact exchanges the velocities along the line of centres."""
     instant = 1.0 - math.sqrt(0.2**2 - 0.1**2)
     normal = ((1.0 - instant) / 0.2, 0.1 / 0.2)
     taken = (normal[0] ** 2, normal[0] * normal[1])

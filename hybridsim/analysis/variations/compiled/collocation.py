@@ -25,7 +25,7 @@ class FlowTapes(NamedTuple):
 
 
 class RunArrays(NamedTuple):
-    """What the rates of a run depend on in each of N segments, and the derivatives by states and q constants."""
+    """The arguments of the rates in N segments, and their derivatives with respect to states and q constants."""
 
     tape: np.ndarray  # (N,) number of the instruction tape
     vectors: np.ndarray  # (N, P) run-time vectors
@@ -119,7 +119,7 @@ def _set_up(rule: Any, work: Any, outputs: Any, length: float) -> bool:
 
 @inlined
 def _unresolved(rule: Any, run: Any, M: Any, length: float, moved: Any) -> float:
-    """Write the derivatives over a part from its solved equations, and return how well they are resolved."""
+    """Write the derivatives over a part from the solved equations, and return a measure of their resolution."""
     n, width = moved.shape
     scale, tails, sizes, worst = run.scale, 0.0, 0.0, 0.0
     for b in range(width):
@@ -154,7 +154,7 @@ def over_parts(
     matrices: Any,
     tails: Any,
 ) -> None:
-    """Write the derivatives (K, n, n + q) over parts, and how well each is resolved: NaN without a derivative.
+    """Write the derivatives (K, n, n + q) over parts, and how well they are resolved; NaN means no derivative.
 
     parts: numbers of the segments (K,) and lengths (K,). nodes: local times (8 K,) and states (8 K, n).
     """
@@ -181,7 +181,7 @@ def over_parts(
 def speeds_at(
     tapes: Any, inputs: Any, run: Any, work: Any, numbers: Any, s: Any, x: Any, speeds: Any
 ) -> None:
-    """Write a bound of the eigenvalues of the rates' derivatives at ascending points, or zero without derivatives.
+    """Write a bound of the eigenvalues of the Jacobian of the rates at ascending points, or zero if it does not exist.
 
     It is the square root of a norm of the square of the matrix.
     """

@@ -94,7 +94,7 @@ class CompiledFlow:
         )
 
     def over(self, parts: Steps) -> tuple[np.ndarray, np.ndarray]:
-        """Return the derivatives (K, n, n + q) over parts, and how well each is resolved: NaN if they do not exist."""
+        """Return the derivatives (K, n, n + q) over parts, and how well they are resolved; NaN means no derivative."""
         lengths = parts.ends - parts.begins
         s = (parts.begins[:, None] + lengths[:, None] * GAUSS.nodes).ravel()
         x = self._segments.states(np.repeat(parts.number, WIDTH), s)
@@ -111,7 +111,7 @@ class CompiledFlow:
         return self._system.n, self._run.fixed.shape[1]
 
     def speeds(self, number: np.ndarray, s: np.ndarray, x: np.ndarray) -> np.ndarray:
-        """Return a bound (m,) of the eigenvalues of the rates' derivatives by the states at ascending points."""
+        """Return a bound (m,) of the eigenvalues of the Jacobian of the rates, at points in ascending order."""
         found = np.empty(len(s))
         _speeds_at(
             self._tapes, self._system.registers.inputs, self._run, self._work, number, s,

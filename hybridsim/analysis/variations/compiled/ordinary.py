@@ -47,7 +47,7 @@ def _plain_guards(system: System) -> np.ndarray:
 
 
 def guards_between(solution: Solution, slack: float) -> np.ndarray:
-    """Return the guard (N,) that ends each of the N segments of a run, and -1 where none does.
+    """Return the guard (N,) that ends each of the N segments of a run, or -1 if no guard ends the segment.
 
     slack : time before the end of the run at which an instant counts as the end.
     """
@@ -92,7 +92,7 @@ def are_of_the_model(system: System, guards: np.ndarray) -> np.ndarray:
 
 
 class Passage:
-    """Computes gradients at the ordinary events of a run, and those of held states at the ends of its segments."""
+    """Computes derivatives of ordinary events of a run, and derivatives of held states at both ends of each segment."""
 
     def __init__(self, solution: Solution, vector: VectorSlopes, moving: list[int]) -> None:
         self._system, self._vector, segments = solution._system, vector, solution._segments
@@ -128,7 +128,7 @@ class Passage:
         return values, slopes[:, self._system.n :]
 
     def at_events(self, guards: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the derivatives (N, n + q) of the events' times, and the rates before minus those after (N, n)."""
+        """Return the derivatives (N, n + q) of event times, and the rates (N, n) before minus after each event."""
         n, modes = self._system.n, self._modes
         delays, jumps = np.zeros((len(modes), len(self._chosen))), np.zeros((len(modes), n))
         events = np.flatnonzero(guards >= 0)
@@ -169,7 +169,7 @@ class Passage:
             raise NotOrdinary
 
     def _on_constraints(self, z: np.ndarray, points: Points, rates: np.ndarray) -> np.ndarray:
-        """Return the rates (m, n), of held states along their constraints."""
+        """Return the rates (m, n); held states move along their constraints."""
         if not self._system.holds(z):
             return rates
         time = Dual(points.s, np.ones((1, len(points.s))))
@@ -177,7 +177,7 @@ class Passage:
         return self._projected(time, states, list(points.vectors.T), z, len(points.s))[:, :, 0]
 
     def held(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return which segments hold states (N,), and the derivatives (N, n, n + q) there, at the starts and ends."""
+        """Return a mask (N,) of segments with held states, and derivatives (N, n, n + q) at their starts and ends."""
         system, modes, n = self._system, self._modes, self._system.n
         holds, width = np.zeros(len(modes), dtype=np.bool_), len(self._chosen)
         maps = np.zeros((2, len(modes), n, width))
@@ -202,7 +202,7 @@ class Passage:
         return holds, maps[0], maps[1]
 
     def _projected(self, s: Any, states: list[Any], p: list[Any], z: np.ndarray, count: int) -> np.ndarray:
-        """Return the derivatives (m, n, D) of the states with held states on their constraints."""
+        """Return the derivatives (m, n, D) of the states; held states follow from their constraints."""
         module: Any = self._system.code.module
         out: list[Any] = [0.0] * self._system.n
         p[self._system.layout.pin_at] = 1.0  # held states follow from their constraints
@@ -221,7 +221,7 @@ class Passage:
 def passages_of(
     solution: Solution, vector: VectorSlopes, moving: list[int], parts: Intervals, slack: float
 ) -> tuple[np.ndarray, Any]:
-    """Return the guards (N,) that end the segments of a run of ordinary events, and its packed `Passages`."""
+    """Return the guards (N,) that end the segments of a run with ordinary events only, and the packed `Passages`."""
     guards = guards_between(solution, slack)
     passage = Passage(solution, vector, moving)
     delays, jumps = passage.at_events(guards)
@@ -231,7 +231,7 @@ def passages_of(
 
 
 def _alike(rows: np.ndarray) -> Iterator[np.ndarray]:
-    """Yield the numbers of equal rows."""
+    """Yield the row numbers of each group of equal rows."""
     if not len(rows):
         return
     _, group = np.unique(rows, axis=0, return_inverse=True)

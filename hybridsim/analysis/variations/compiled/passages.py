@@ -16,7 +16,7 @@ from hybridsim.engine.series.tangent_panel import run_panel, set_numbers, set_po
 
 
 class Points(NamedTuple):
-    """Some points of a run, at which functions are differentiated by all their arguments."""
+    """Points of a run, at which functions are differentiated with respect to all their arguments."""
 
     s: np.ndarray  # (m,) local times
     x: np.ndarray  # (m, n) states
@@ -25,7 +25,7 @@ class Points(NamedTuple):
 
 
 class Passages(NamedTuple):
-    """The linear maps of N segments and of the events between them, for changes of n states and q constants."""
+    """The linear maps of changes of n states and q constants through N segments and the events between them."""
 
     first: np.ndarray  # (N + 1,) number of the first part of each segment, and the number of parts
     matrices: np.ndarray  # (K, n, n + q) derivatives over the parts
@@ -88,7 +88,7 @@ def _apply(matrix: Any, Y: Any, C: Any, out: Any) -> None:
 
 @kernel
 def carry_ordinary(passages: Any, C: Any, starts: Any, shifts: Any, end: Any, other: Any) -> None:
-    """Write the derivatives (N, n, M) at the starts of segments, (N, M) of these instants, and (n, M) at the end.
+    """Write derivatives of states at segment starts (N, n, M), start times (N, M), and states at the end (n, M).
 
     C (q, M): the changes of the constants. starts[0] is known. other (n, M): scratch.
     """

@@ -88,11 +88,11 @@ class VectorSlopes:
 
     @property
     def is_fixed(self) -> bool:
-        """Whether the derivatives depend on the origin of local time alone, as `seeds_and_rates` returns them."""
+        """Whether the derivatives depend only on the origin of local time, as `seeds_and_rates` assumes."""
         return not self._tables and all(signal.is_fixed for signal in self._signals)
 
     def seeds_and_rates(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return `seeds` at the origin 0 of local time, and their derivatives by the origin, without inputs."""
+        """Return `seeds` for a local time with origin 0, and their derivatives with respect to the origin."""
         layout, by_origin = self.system.layout, np.zeros_like(self._fixed)
         below = by_origin[self.system.n + 1 :, self.system.n + 1 + layout.discrete :]
         below[layout.phases_at : layout.signals_at, : layout.parameters] = self.rates
