@@ -1,4 +1,4 @@
-"""This module computes bifurcation diagrams by brute force: settled motions over a parameter, up and down."""
+"""This module computes bifurcation diagrams by brute force: settled motions while a parameter rises and falls."""
 
 from __future__ import annotations
 

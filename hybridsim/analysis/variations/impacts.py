@@ -128,7 +128,7 @@ class Impacts:
         return np.clip(values[rows], 0.0, 1.0), found[rows]
 
     def _system(self, problem: ImpactProblem, names: str, t: float) -> tuple[np.ndarray, Answer]:
-        """Return the matrix of the linear system of the impulses, and the impulses."""
+        """Return the matrix of the linear equations for the impulses, and the impulses."""
         found = answers(problem)
         if len(found) != 1 or found[0].reduced:
             what = "whose rebound was reduced to lose energy" if found else "whose outcome is not unique"

@@ -49,7 +49,7 @@ def _refuse_limits(solution: Solution) -> None:
 
 
 def _refuse_limit(one: Occurrence, component: Any, before: float) -> float:
-    """Raise an error for an accumulation that was not resolved, and return the time of any other event."""
+    """Return the time of the latest ordinary event; raise an error for an accumulation that was not resolved."""
     names = [guard.name for guard in component.mode(one.source).guards]
     t = float(one.instant)
     if one.guard != LIMIT:

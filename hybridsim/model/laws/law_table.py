@@ -201,7 +201,7 @@ class LawTable(Declared):
         return value(self.at, values, self.interpolation, argument)
 
     def expression_at(self, argument: float, name: str) -> Expression:
-        """Return the value at a number of the first argument.
+        """Return the value of the table for a number as first argument.
 
         name: the variable of the table. A table of two arguments gives an expression of the variables of its rows,
         and a table with parameters an expression of them.

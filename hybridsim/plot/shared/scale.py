@@ -93,7 +93,7 @@ def shared_powers(quantities: Mapping[str, tuple[str, float, float]]) -> dict[st
 
 
 def _misfit(power: int, sizes: Iterable[float]) -> float:
-    """Return the powers of ten by which sizes lie outside 1 to 1000, summed, plus a small penalty for a prefix."""
+    """Return the sum of the powers of ten by which sizes lie outside 1 to 1000, plus a small penalty for a prefix."""
     over = (max(power - size, size - power - 3, 0.0) for size in sizes)
     return round(sum(over) + (_PREFIX_COST if power else 0.0), 9)
 

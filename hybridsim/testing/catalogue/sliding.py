@@ -161,7 +161,7 @@ def _circle() -> Scene:
 
 
 def _decay() -> Scene:
-    """Return the test case of v = -t until x + v = 0 at t = sqrt(3) - 1, after which x decays as exp(-t)."""
+    """Return the test case of v = -t up to the surface x + v = 0 at t = sqrt(3) - 1; then x decays as exp(-t)."""
     onto = math.sqrt(3) - 1
     states = [(0.5, (0.875, -0.5))]
     states += [(t, (onto * math.exp(onto - t), -onto * math.exp(onto - t))) for t in (1.0, 2.0, 5.0)]

@@ -1,4 +1,4 @@
-"""This module solves the equations of Gauss collocation of many parts in compiled code.
+"""This module solves, in compiled code, the equations of Gauss collocation on many parts of a run.
 
 The equations are those of `hybridsim.analysis.variations.smooth`. The eight nodes of a part are one panel of
 `hybridsim.engine.series.tangent_panel`.
