@@ -204,7 +204,8 @@ over N. For each load the script finds the largest amplitude over the frequency.
 - **No normal load.** The peak of the blade alone is F0/(c omega_d) = {1e3 * ends[0]:.6f} mm, with omega_d =
   sqrt(k_b/m - (c/2m)^2). At N = {loads[0]:g} N the relative difference of the sweep from this peak is {
         off[0]:.2e}. The
-  reason is friction in the damper, which decreases the peak by the share 4 mu N/(pi F0) = {light:.2e}.
+  reason is friction in the damper, which decreases the peak by the relative amount
+  4 mu N/(pi F0) = {light:.2e}.
 - **Damper that always sticks.** With the stiffness k_b + k_d the peak of the amplitude is {
         1e3 * ends[1]:.6f} mm.
   At N = {loads[-1]:g} N the relative difference of the sweep from this peak is {off[1]:.1e}.

@@ -154,8 +154,8 @@ model, such as an impact, or a way to write an expression. The models combine th
   functions is written in one of several equivalent ways.
 - Forces, loads and speeds of belts change at known times. These changes are written as single conditions, Boolean
   combinations of conditions, tables or waves.
-- Runs start on guards, at rest and on corners. Schedules, clocks, impacts, contacts, relays and monitors have events
-  at the same instant.
+- Runs start on a guard, at rest or on a corner. Schedules, clocks, impacts, contacts, relays and monitors have
+  events at the same instant.
 - Parts of a model depend on states of other parts. Some expressions use a definition.
 - Names, the order of declaration, the scale and sign of states, and the origin of time are also random. One run in
   ten is stopped in the middle and resumed.
