@@ -53,7 +53,7 @@ class SteadyReading(Readable):
     value : float
         The reading itself.
     by_parameter : array
-        (P,) derivatives by the chosen parameters.
+        (P,) derivatives with respect to the chosen parameters.
     """
 
     name: str

@@ -28,9 +28,10 @@ class Derivatives(Readable):
     names : tuple of str
         Names of the quantities.
     by_start : array
-        (m, n + d) derivatives by the states and discrete states at the start, or (k, m, n + d) for k times.
+        (m, n + d) derivatives with respect to the states and discrete states at the start, or
+        (k, m, n + d) for k times.
     by_parameter : array
-        (m, P) derivatives by the chosen parameters, or (k, m, P) for k times.
+        (m, P) derivatives with respect to the chosen parameters, or (k, m, P) for k times.
     """
 
     names: tuple[str, ...]

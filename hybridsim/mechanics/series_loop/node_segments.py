@@ -107,5 +107,5 @@ class NodeSegments:
 
 
 def instants(parts: np.ndarray) -> np.ndarray:
-    """Return times (k, 3), given as (high, low, local), rounded to the nearest doubles."""
+    """Return times as doubles, from the terms (high, low, local) of each time, (k, 3)."""
     return parts[:, 0] + (parts[:, 1] + parts[:, 2]) if len(parts) else np.zeros(0)

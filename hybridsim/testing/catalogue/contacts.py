@@ -60,7 +60,7 @@ def tied() -> Scene:
     release, own, forced = math.asin(0.4) / 4, math.sqrt(30), 7.5 / 14
 
     def after(t: float) -> tuple[float, float]:
-        """Return position and velocity of body 2, where x2'' + 30 x2 = 7.5 sin(4 t) - 2.1 after its release at rest."""
+        """Return position and velocity of body 2, released at rest, with x2'' + 30 x2 = 7.5 sin(4 t) - 2.1."""
         x0 = -forced * math.sin(4 * release) + 0.07
         v0 = -4 * forced * math.cos(4 * release) / own
         c, s = math.cos(own * (t - release)), math.sin(own * (t - release))

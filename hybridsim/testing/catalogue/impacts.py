@@ -117,7 +117,7 @@ def _table() -> Scene:
 
 
 def _walls() -> Scene:
-    """Return the test case of balls of masses 1 and 3 between walls, whose motion is a sequence of rational numbers."""
+    """Return the test case of balls of masses 1 and 3 between walls, with rational impact times and velocities."""
     end = 12
     hits, motion = _impacts_of_row(end)
     sampled = (Fraction(1, 2), Fraction(2), Fraction(5), Fraction(9), Fraction(end))

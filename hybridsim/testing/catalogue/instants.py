@@ -11,7 +11,7 @@ from hybridsim.testing.scene import Scene, Truth, named, needs
 
 
 def scenes() -> tuple[Scene, ...]:
-    """Return test cases of additive resets, zeros at clock ticks, touches, copied values and successive zeros."""
+    """Return test cases of additive resets, zeros at clock ticks, zeros without a sign change, and copied values."""
     return (
         _doses(),
         _counting_balls(),

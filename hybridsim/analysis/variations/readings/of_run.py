@@ -45,9 +45,9 @@ class ReadingDerivatives(Readable):
     value : float
         The reading itself.
     by_start : array
-        (n + d,) derivatives by the states and discrete states at the start.
+        (n + d,) derivatives with respect to the states and discrete states at the start.
     by_parameter : array
-        (P,) derivatives by the chosen parameters.
+        (P,) derivatives with respect to the chosen parameters.
     """
 
     name: str

@@ -1,7 +1,7 @@
 """This module computes derivatives of an input of kind "table" with respect to its values.
 
-A piece of a table is linear in the values, also with cubic interpolation. Its derivative by one value is the piece of
-the table that has this value 1 and all others 0.
+A piece of a table is linear in the values, also with cubic interpolation. Its derivative with respect to one value is
+the piece of the table that has this value 1 and all others 0.
 """
 
 from __future__ import annotations
