@@ -165,8 +165,8 @@ Does hybridsim ever miss a zero of a guard? Of {zeros} single zeros of {count} r
 Two zeros may also be so close together that rounding decides whether they exist. The tables below count such pairs.
 
 `python docs/studies/guards.py` draws {count} random guards, half for `exact` and half for `taylor` (rtol
-{rtol:.0e}). It compares every mode change of the runs with an independent solution. This solution has each guard g
-in closed form, for exactly the numbers that the run uses. It computes zeros and distances from zero in 40 digits.
+{rtol:.0e}). It compares every mode change of the runs with an independent solution. This solution uses a closed
+form of each guard g, with exactly the numbers of the run. It computes zeros and distances from zero in 40 digits.
 
 A model has two modes. The guard of one mode is g, and the guard of the other mode is -g. Therefore the mode changes
 at each zero of g. After the change, the guard of the new mode starts at zero. The run must not count this zero as

@@ -388,10 +388,10 @@ HEAD = """# Does a run depend on earlier runs?
 Does the result of a run depend on earlier runs in the same process? {compared} runs were made after other runs, and
 {differ} of them differ from the same run in a new process.
 
-`python docs/studies/history.py` selects up to 100 models. They are the models of the package, three chains of
-blocks, and random models ([combined forms](combined-forms.md)). This page shows the results for {models} models, of
-which {many} has more than {limit} combinations of modes. For such a model the process keeps a table of the
-combinations that its runs have reached. Earlier runs therefore change this table.
+`python docs/studies/history.py` tests up to 100 models. They are the models of the package, three chains of blocks,
+and random models ([combined forms](combined-forms.md)). This page shows the results for {models} models, of which
+{many} has more than {limit} combinations of modes. For such a model the process keeps a table of the combinations
+that its runs have reached. Earlier runs therefore change this table.
 
 For each model one process makes {runs} other runs, in random order and by random integrators:
 

@@ -151,11 +151,11 @@ between steps, as a test of the dense output. The fourth is the end of the run.
 
 - There are 100 dense linear systems x' = A x + f phi(t) of one to eight states. There are six kinds of matrices A.
   A *generic* matrix has random elements. An *oscillatory* matrix causes about ten oscillations in a run. A
-  *defective* matrix has fewer eigenvectors than states, and contains no rounding error. A *nearly defective* matrix
-  differs from a defective matrix by 1e-4 to 1e-15. A *stiff* matrix has a ratio of rates from 10 to 1e4. For a
-  *very stiff* matrix this ratio is from 1e4 to 1e8. Only `exact` and `rodas5p` run systems of this last kind. The
-  forcing phi is zero, constant, a polynomial, an exponential, a sine, or t exp(-e t) cos(w t). The reference is a
-  matrix exponential in integers of {bits} bits.
+  *defective* matrix has fewer eigenvectors than states. Its elements are exact. A *nearly defective* matrix differs
+  from a defective matrix by 1e-4 to 1e-15. A *stiff* matrix has a ratio of rates from 10 to 1e4. For a *very stiff*
+  matrix this ratio is from 1e4 to 1e8. Only `exact` and `rodas5p` run systems of this last kind. The forcing phi is
+  zero, constant, a polynomial, an exponential, a sine, or t exp(-e t) cos(w t). The reference is a matrix
+  exponential in integers of {bits} bits.
 - There are 80 systems of one to four states with random smooth expressions (sums, products, quotients, roots, exp,
   sin, cos, tanh, atan). The reference is a Taylor series in integers, with about 18 correct digits.
 - There are 20 coupled stiff nonlinear systems of two to four states. The exact solution of each state is a sine. In

@@ -75,10 +75,11 @@ restarts some quantities are zero by definition ([events](../explanation/events.
 too.
 
 hybridsim computes the Taylor series of the guard, with an error bound for each coefficient. Coefficients that are
-zero by definition are skipped. A restart is *clear* if the true value of the first other coefficient is more than
-twice its error bound. For a clear restart the verdict of hybridsim must be the true verdict. All other restarts are
-*inside the error bound*, and follow another rule. A coefficient within its bound counts as zero, and the next
-coefficient decides. If no coefficient decides, the verdict is "undecided", and the mode does not change.
+zero by definition are skipped, and the next coefficient decides. A restart is *clear* if the true value of this
+coefficient is more than twice its error bound. For a clear restart the verdict of hybridsim must be the true
+verdict. All other restarts are *inside the error bound*, and follow another rule. A coefficient within its bound
+counts as zero, and the next coefficient decides. If no coefficient decides, the verdict is "undecided", and the
+mode does not change.
 
 ## Verdicts
 
@@ -95,10 +96,10 @@ near to it.
 | --- | --- | --- | --- | --- | --- | --- | --- | --- |
 """
 SEARCHES = """
-A restart is *spurious* if the engine finds that the guard fires, but the oracle does not. It is *missed* in the
-opposite case. *Inside, decided* means that the first coefficient is within its bound, so that a higher derivative
-decides. The last column is the largest error of a computed coefficient, divided by its bound. The bounds are valid
-if this quotient is below 1.
+A restart is *spurious* if hybridsim finds that the guard fires, but the oracle does not. It is *missed* if the
+oracle finds that the guard fires, but hybridsim does not. *Inside, decided* means that the first coefficient is
+within its bound, so that a higher derivative decides. The last column is the largest error of a computed
+coefficient, divided by its bound. The bounds are valid if this quotient is below 1.
 
 ## Searches
 

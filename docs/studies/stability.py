@@ -189,10 +189,10 @@ The option `eps_v` is a speed in the unit of the model. If the largest speed is 
 `model.regularized("karnopp", v0=5e-4)` are the regularized laws, for `rk4-sign` or any other integrator. The law
 `tanh` supports only models whose static friction does not exceed kinetic friction. Other models raise an error.
 
-You do not know the largest speed in advance. It is small just above the threshold of motion, and a zone then causes
-the largest errors. Run the model once, read the largest speed, and compare the zone with it. Near the threshold (F0/N
-= 0.54) tanh needs a v0 of 0.1 % or less. RK4 is then stable only with 26 000 or more steps per period. With
-`exact`, `taylor` and `dop853` you choose neither a step nor a zone.
+You do not know the largest speed in advance. Just above the threshold of motion this speed is small, and a zone
+then causes the largest errors. Run the model once, read the largest speed, and compare the zone with it. Near the
+threshold (F0/N = 0.54) tanh needs a v0 of 0.1 % or less. RK4 is then stable only with 26 000 or more steps per
+period. With `exact`, `taylor` and `dop853` you choose neither a step nor a zone.
 
 ## Maps of step and zone
 
@@ -261,12 +261,12 @@ Let X be the amplitude, V the largest speed, a the deceleration before a stop, a
 maps the place of a stop to the place of the next stop. G_x is the derivative of G with respect to the place. G_v is
 the derivative of G with respect to an outward speed at the release.
 
-**Velocity set to zero, zone too wide.** Stops are too early. If a body stops at the speed eps_v, its way to the
-stop is too short by eps_v^2/(2 a). This error occurs at every stop. The error of the amplitude reaches 1 % at
-eps_v^2/(2 a) = 0.01 X (1 - G_x). On the belt the extreme of x is reached before the stop, when the relative speed
-is that of the belt. There the limit is at (eps_v - v_belt)^2/(2 a) = 0.02 X. This formula gives 41 % of V, and the
-measured limit is 36 %. If eps_v is above V, the body sticks as soon as the applied force permits stick. This false
-stick causes an error of the amplitude of 75 %.
+**Velocity set to zero, zone too wide.** Stops are too early. If the method stops a body at the speed eps_v, the
+position of the stop has an error of eps_v^2/(2 a). This error occurs at every stop. The error of the amplitude
+reaches 1 % at eps_v^2/(2 a) = 0.01 X (1 - G_x). On the belt the extreme of x is reached before the stop, when the
+relative speed is that of the belt. There the limit is at (eps_v - v_belt)^2/(2 a) = 0.02 X. This formula gives 41 %
+of V, and the measured limit is 36 %. If eps_v is above V, the body sticks as soon as the applied force permits
+stick. This false stick causes an error of the amplitude of 75 %.
 
 **Velocity kept, zone too wide.** The body creeps in stick. When it should stick, it moves at up to eps_v by the
 distance eps_v t_stick. It then begins its slip with the speed eps_v in the wrong direction. The limit of the zone
@@ -277,7 +277,7 @@ slip that begins with a wrong speed moves away from the true slip. The limit is 
 | --- | --- | --- | --- | --- | --- | --- |
 {theories}
 
-The theory of creep assumes that the kept velocity is eps_v. The actual velocity is between zero and eps_v.
+The theory of creep assumes that the kept velocity is eps_v. The kept velocity is in fact between zero and eps_v.
 
 **No stop at all** (F0/N = 1 at r = 0.6, F0/N = 0.75 at r = 0.8). In the zone, Eq. 4 lets the friction force oppose
 the applied force e. The friction force therefore reverses before the velocity. The reversal of the velocity is late
@@ -285,17 +285,18 @@ by m eps_v (1/(e - mu N) - 1/(e + mu N)). This error is of first order in eps_v,
 too wide. From 4 % of V on, the body sticks at the reversal (F0/N = 1).
 
 **Zone too narrow.** The dichotomy halves the step 16 times at most. Then the speed is up to a h/2^16 (dotted line).
-If the zone is narrower, the method continues with a speed outside of the zone. In the reference model this has no
-effect if the step is short enough. On the belt, with fewer than about 90 steps per period, sticks are missed.
+If the zone is narrower than this speed, the method continues with a speed outside of the zone. In the reference
+model this has no effect if the step is short enough. On the belt, with fewer than about 90 steps per period, sticks
+are missed.
 
 **Step too long.** Releases are late, and stops are missed. A release is placed at the end of its step. If the
 release is a whole step late, the slip ends at another place. The column "late release" of the table above gives the
 resulting limit. The measured limit is lower, because a release is rarely a whole step late. With fewer than 10
-steps per period stops are missed. There are two causes. The velocities at both ends of a step have the same sign,
-or the state after the bisection is beyond the next release. On the belt a trial step beyond v = 0 still uses the
-friction law for the side before v = 0. This law, 1/(1 + delta v), has a pole at v = -1/delta. The step reaches the
-pole if h > 1/(delta a), which is the case with fewer than 55 steps per period. With fewer than about 30 steps the
-motion grows without bound.
+steps per period, stops are missed for two reasons. The velocities at both ends of a step have the same sign, or the
+state after the bisection is beyond the next release. On the belt a trial step beyond v = 0 still uses the friction
+law for the side before v = 0. This law, 1/(1 + delta v), has a pole at v = -1/delta. The step reaches the pole if h
+> 1/(delta a), which is the case with fewer than 55 steps per period. With fewer than about 30 steps the motion
+grows without bound.
 
 **`rk4-sign`.** The velocity chatters. In place of stick, the velocity changes its sign in each step, with speeds up
 to 2 mu N h/m. The error of the amplitude is of first order in h. It is larger for smaller amplitudes.

@@ -235,8 +235,8 @@ includes the times and states of all steps, the events with the states before an
 ## Killed
 
 A sweep of {points} points runs in a separate process, and took {seconds:.1f} s without interruption. SIGKILL ended
-the process {kills} times at random times, and each time the sweep was started again. In {begun} cases the sweep had
-finished before the kill, and was then started again without a journal. The process writes each point to a log file
+the process {kills} times at random times, and each time the sweep was started again. In {begun} cases the sweep
+finished before the kill. It then started again without a journal. The process writes each point to a log file
 before it computes the point.
 
 | | |

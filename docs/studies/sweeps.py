@@ -136,7 +136,7 @@ def page(
             "",
             "## Other points",
             "",
-            f"The sweep finds these motions at the other points: {kinds}.",
+            f"The other points have motions of these kinds: {kinds}.",
             "",
             "| points | status |",
             "| --- | --- |",

@@ -88,7 +88,8 @@ def page() -> str:
 
 HEAD = """# Faults of units
 
-How many faults of units does `hybridsim check` find? It finds {share:.1f} % of random faults, on the right line.
+How many faults of units does `hybridsim check` find? It finds {share:.1f} % of random faults, and names the right
+line.
 
 `python docs/studies/units.py` puts faults of units into the packaged models that declare units, one fault at a time.
 It counts how many faults `hybridsim check` finds, and on which lines. See [Check the units of a
@@ -110,14 +111,14 @@ no code with the check. These changes do not count:
 - Other checks refuse the changed model.
 
 A fault is found on the right line if the warning is on the line of the changed expression. For a changed
-declaration, the line of each expression with the declared name is right too. For a change in the law of a contact,
-the line of its load or of its arguments is right.
+declaration, a line of an expression with the declared name counts as right too. For a change in the law of a
+contact, the line of its load or of its arguments is right.
 """
 REASONS = """The faults were not found for these reasons:
 
 - The unit of an impact force is not declared. If `m` is left out of `-g + p/m`, `p` becomes an acceleration, and
-  all units still agree. An exception is a model in which a contact force determines the unit of `p`. The unit of t
-  in `thermostat` is not declared either.
+  all units still agree. Only a contact force in the same model can determine the unit of `p`. The unit of t in
+  `thermostat` is not declared either.
 - A number in a product may be a constant with a unit, so any unit of the product is accepted. Examples are
   `0.6*sqrt(k/m)`, `0.1*A*omega` and `w**2/2`.
 - If two expressions imply different units of a force, the warning may be on the line of the unchanged expression.

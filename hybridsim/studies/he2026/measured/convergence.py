@@ -111,7 +111,8 @@ def claim_figure_4(curves: Curves) -> Claim:
     counts = ", ".join(f"{m}: {row['converged at 1200']} of {len(CASES)}" for m, row in without.items())
     why = (
         f"With stick, A and E have converged to 0.1 % in all {len(CASES)} cases if h0 is at least "
-        f"{with_[closest]['latest']:.0f}. The reading is {closest}. At h0 = 1200, A is within "
+        f"{with_[closest]['latest']:.0f}. "
+        f'This reading is "{closest}". At h0 = 1200, A is within '
         f"{100 * with_[closest]['largest error']:.2g} % of the exact A. Without stick, fewer cases have "
         f"converged at h0 = 1200 ({counts}). The reason is the chatter of the velocity, whose effect is of "
         "first order in the step."
@@ -141,7 +142,7 @@ def claim_figure_5(curves: Curves) -> Claim:
     verdict = Verdict.SHAPE if ratio < 0.5 else Verdict.REPRODUCED
     literal = ours[paper.LITERAL.name]
     why = (
-        f"The reading closest to the paper is {closest}. In this reading A and E have converged in all "
+        f'The reading closest to the paper is "{closest}". In this reading A and E have converged in all '
         f"{len(CASES)} cases if eps_v is at most {best['latest']:.1e}. With v kept, as in Eq. 4 of the "
         f"paper, eps_v must be at most {literal['latest']:.1e}. With v kept and the published eps_v = "
         f"8e-4, the error of A is up to {100 * literal['largest error']:.2g} % in these cases. At {RIDGE} "

@@ -107,8 +107,8 @@ way. The paper leaves these details of the methods open:
   the limit of friction.
 - *force by step* or *by stage*: the direction of friction is chosen once per step, or at each stage of RK4. For A1
   these choices are called *sign by step* and *sign by stage*.
-- *full-step* or *rest-of-step*: the step after an event is a full step, or it ends where the interrupted step would
-  have ended.
+- *full-step* or *rest-of-step*: the step after an event has the full length, or only completes the interrupted
+  step.
 
 One command makes this page, its pictures and the [verdicts as data](he2026.json):
 `hybridsim study he2026{quick} --out FOLDER`."""

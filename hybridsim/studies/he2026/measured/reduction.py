@@ -138,13 +138,13 @@ def claim(found: Reduction) -> Claim:
     verdict = Verdict.REPRODUCED if both and to_rounding else Verdict.SHAPE if to_rounding else Verdict.NOT
     literal, stribeck = ours[paper.LITERAL.name], float(found.spread(STRIBECK).max())
     why = (
-        f"With `exact`, the results at {_SAMPLES} points were computed for three normal loads each. A/A0, "
-        "E/E0 and the stick fraction depend only on r and F0/N, apart from differences of at most "
-        f"{max(found.rounding.values()):.0e}. Without stick the same holds for A/A0 and E/E0, apart from "
-        "the chatter. The reduction fails if eps_v or a parameter of the law is a velocity in m/s. With "
-        f"eps_v = 8e-4 m/s and v kept, A/A0 varies by {100 * literal['spread of A/A0']:.2g} % between F0 = "
-        f"{FORCES[0]:g} N and {FORCES[-1]:g} N. With a Stribeck law, which contains a velocity, A/A0 "
-        f"varies by {100 * stribeck:.2g} %."
+        f"With `exact`, A/A0, E/E0 and the stick fraction were computed at {_SAMPLES} points, for three "
+        "normal loads at each point. The results for the three loads differ by at most "
+        f"{max(found.rounding.values()):.0e}. They therefore depend only on r and F0/N. Without stick the "
+        "same holds for A/A0 and E/E0, apart from the chatter. The reduction fails if eps_v or a "
+        "parameter of the law is a velocity in m/s. With eps_v = 8e-4 m/s and v kept, A/A0 varies by "
+        f"{100 * literal['spread of A/A0']:.2g} % between F0 = {FORCES[0]:g} N and {FORCES[-1]:g} N. With "
+        f"a Stribeck law, which contains a velocity, A/A0 varies by {100 * stribeck:.2g} %."
     )
     return Claim(
         "figures 8, 9",
