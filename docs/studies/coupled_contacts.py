@@ -99,8 +99,8 @@ rtol {RTOL:g}.
 
 At each event the script tries all combinations of stick, slip forward and slip backward for the contacts at rest.
 For each combination it computes the accelerations, the forces and two time derivatives of the forces. It solves the
-whole system of equations in 40 digits. The method of hybridsim is different, because it uses a Delassus operator
-and pivoting. The modes that the run has selected must be one of the admissible combinations.
+whole system of equations in 40 digits. hybridsim uses another method, with a Delassus operator and pivoting. The
+combination that hybridsim selects must be admissible.
 
 Each system also runs with its coordinates and contacts declared in {ORDERS} other orders. The columns "orders
 apart" give the largest difference of the final states between these runs and the first run.

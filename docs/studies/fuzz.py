@@ -130,7 +130,7 @@ and of missing files. A command that runs longer than {commanded:g} seconds is i
 | --- | --- |
 {line_rows}
 
-The exit codes are [those of the reference](../reference/cli.md).
+The [reference](../reference/cli.md) lists the exit codes.
 
 ## Detection of faults
 

@@ -411,8 +411,8 @@ at these times:
 
 The reference is the same run in a new process. This process makes no other run, and starts with an empty cache of
 compiled models. The last column of the table is for a new process that uses the cache of the process with {runs}
-runs. All results are compared bit for bit. They are the status, the message, the warnings, the events with the
-states before and after them, all steps, and the dense output at {points} times.
+runs. All results are compared bit for bit. The comparison includes the status, the message, the warnings, the
+events with the states before and after them, all steps, and the dense output at {points} times.
 
 """
 

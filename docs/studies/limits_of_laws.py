@@ -249,7 +249,8 @@ of magnitude. The error is the additional velocity at the end of this interval.
 
 - `tanh`: d = 2 mu N exp(-2 v/v0). Then v is of size v0, and s is of size v0^(1/2). The velocity also has a factor
   log(1/v0), because d must decrease from mu N to r s.
-- `arctan`: d = (2/pi) mu N v0/v. The velocity v is of size s^2. Then s^3 is of size v0, and v is of size v0^(2/3).
+- `arctan`: d = (2/pi) mu N v0/v. The velocity v is of size s^2, and d is of size s. Therefore s^3 is of size v0,
+  and v is of size v0^(2/3).
 - `dahl`, `lugre`: d = mu N exp(-sigma x/(mu N)), with the stiffness sigma. Then x is of size 1/sigma, s of size
   sigma^(-1/3) and v of size sigma^(-2/3). The damping of the bristles is sqrt(sigma_0 m) v d/(mu N), which is
   smaller than d by a factor of sigma^(-1/6).
@@ -271,8 +272,9 @@ of magnitude. The error is the additional velocity at the end of this interval.
 
 - Regularizations by a function of the velocity, and their run times: E. Pennestri et al., Nonlinear Dyn. 83 (2016)
   1785, [doi:10.1007/s11071-015-2485-3](https://doi.org/10.1007/s11071-015-2485-3).
-- Convergence of solutions of regularized fields to those of Filippov. A. F. Filippov, *Differential Equations with
-  Discontinuous Righthand Sides* (1988), [doi:10.1007/978-94-015-7793-9](https://doi.org/10.1007/978-94-015-7793-9).
+- Convergence of the solutions of regularized equations to Filippov solutions: A. F. Filippov, *Differential
+  Equations with Discontinuous Righthand Sides* (1988),
+  [doi:10.1007/978-94-015-7793-9](https://doi.org/10.1007/978-94-015-7793-9).
 - Karnopp's law, [doi:10.1115/1.3140698](https://doi.org/10.1115/1.3140698).
 - Dahl's law, [doi:10.2514/3.61511](https://doi.org/10.2514/3.61511).
 - LuGre's law, [doi:10.1109/9.376053](https://doi.org/10.1109/9.376053).

@@ -272,9 +272,8 @@ largest impulse. Times are on one core of a machine that also ran other programs
 With the option `theta` = 1/2, the sum of all works in a step equals the gain of kinetic and elastic energy. The
 last column gives the error of this balance, relative to the work of the belt. It consists of rounding errors. The
 works of friction and impacts are negative, so neither of them adds energy. A contact becomes active in the first
-step in which its gap would close by the middle of the step. A gap may therefore become negative. Its size is then
-at most 1 - e/2 times the distance that the two blocks approach in a step. Every gap in this study is above this
-limit.
+step in which its gap would close by the middle of the step. A gap may therefore become negative. This overlap is at
+most 1 - e/2 times the distance that the two blocks approach in a step. No overlap in this study exceeds this limit.
 """
 
 

@@ -38,9 +38,9 @@ HEAD = """# The published methods at their own speed
 How much slower are the published methods in hybridsim than the same methods written by hand for one system?
 hybridsim takes {least:.2f} to {most:.2f} times as long.
 
-`python docs/studies/published_speed.py` compares the integrators `rk4-dichotomy` and `rk4-sign` with the methods of
-the [paper of He et al.](he2026.md) These methods are written by hand for the system of this paper. The code that is
-written by hand is compiled by numba (`docs/studies/rivals/published_rk4.py`).
+`python docs/studies/published_speed.py` compares the integrators `rk4-dichotomy` and `rk4-sign` with code that is
+written by hand. Both use the methods of a [published study](he2026.md). The code by hand is for the system of this
+study only, and is compiled by numba (`docs/studies/rivals/published_rk4.py`).
 
 - Each run has 100 periods of 1200 steps. In each of {turns} turns, every method runs once. {machine}
 - For hybridsim, the time is the processor time of `hs.simulate(..., keep="events")` and of reading the times and

@@ -83,8 +83,8 @@ of components:
 - Monitors.
 
 The numbers of each structure are drawn {draws} times, and each set of numbers is called a draw. The draws of a
-structure are run in turn by `dop853` (rtol 1e-9), `taylor` (rtol 1e-10) and, if possible, `exact`. A second of
-these integrators also runs each draw, and the two runs are compared.
+structure are run in turn by `dop853` (rtol 1e-9), `taylor` (rtol 1e-10) and, if possible, `exact`. Another of these
+integrators also runs the draw, and the two runs are compared.
 
 The *other method* is time stepping without location of events (`tests/reference/stepped_structures.py`). The forces
 of a step satisfy the laws at the end of the step. The method is of first order. It runs with 2003, 4327 and 8923
@@ -144,7 +144,9 @@ def page(done: list[dict[str, Any]], draws: int) -> str:
         )
     refused = Counter(record["refused"].splitlines()[0] for record in done if record["refused"])
     if refused:
-        out += "\nThese structures were refused as models:\n\n| structures | reason |\n| --- | --- |\n"
+        out += (
+            "\nhybridsim refused the models of these structures:\n\n| structures | reason |\n| --- | --- |\n"
+        )
         out += "".join(f"| {count} | {reason} |\n" for reason, count in refused.most_common())
     open_cases = [
         (r["number"], v) for r in accepted for v in r["verdicts"] if v["kind"] not in ("agrees", "sensitive")

@@ -89,8 +89,8 @@ value of the guard is then zero to the last bit, or differs from zero by 1e-19 t
 rate of the guard is changed in the same way.
 
 The other rows are for guards of the oscillator that is described under "Whole runs". Its parameters vary over
-decades, and the time of the restart over up to 10^6 periods. The applied force is at the limit of friction or very
-near to it.
+decades, and the restart is up to 10^6 periods after the start. The applied force is at the limit of friction or
+very near to it.
 
 | restart | judged | clear | spurious | missed | inside, decided | undecided | against the rule | error/bound |
 | --- | --- | --- | --- | --- | --- | --- | --- | --- |

@@ -183,7 +183,11 @@ def page(found: dict[str, Counter[str]]) -> str:
             "| --- |" + " --- |" * len(names),
             *rows,
             "",
-            "*Zeros of guards* is the computation of lower bounds and Bernstein forms, and the refinement of zeros.",
+            (
+                "*Motion and its records* is the time in the compiled event loop itself, without the "
+                "functions of the other rows. *Zeros of guards* is the computation of lower bounds and "
+                "Bernstein forms, and the refinement of zeros."
+            ),
             "*Which mode follows an event* is the computation of the first derivatives of the guards, with error",
             "bounds, in each candidate mode. If the compiler has inlined a function, its time counts as time of the",
             "caller.",

@@ -112,10 +112,10 @@ def claim_figure_4(curves: Curves) -> Claim:
     why = (
         f"With stick, A and E have converged to 0.1 % in all {len(CASES)} cases if h0 is at least "
         f"{with_[closest]['latest']:.0f}. "
-        f'This reading is "{closest}". At h0 = 1200, A is within '
-        f"{100 * with_[closest]['largest error']:.2g} % of the exact A. Without stick, fewer cases have "
-        f"converged at h0 = 1200 ({counts}). The reason is the chatter of the velocity, whose effect is of "
-        "first order in the step."
+        f'This holds for the reading "{closest}". At h0 = 1200, A is '
+        f"within {100 * with_[closest]['largest error']:.2g} % of the exact A. Without stick, fewer cases "
+        f"have converged at h0 = 1200 ({counts}). The reason is the chatter of the velocity, whose effect "
+        "is of first order in the step."
     )
     return Claim(
         "figure 4",

@@ -170,9 +170,9 @@ def claim(found: Maps, quantity: str, study: StepStudy) -> Claim:
         f"{_percent(best['maximum'])} at F0/N = {best['at'][0]:g}, r = {best['at'][1]:g}. Along the ridge "
         f"{quantity}_D stays above 10 % up to F0/N = {end['F0/N']:g}, r = {end['r']:g}. "
         f"{study.sentence(quantity)} Near the threshold of motion, at F0/N = {found.ratios[0]:g}, the "
-        f"median of {quantity}_D over r is {_percent(best['near the threshold'])} in this reading. It is "
-        f"{_percent(truly['near the threshold'])} if {quantity}2 is the value of the exact motion. In the "
-        f"paper {quantity}_D decreases towards the threshold."
+        f"median of {quantity}_D over r is {_percent(best['near the threshold'])} in this reading. The "
+        f"median is {_percent(truly['near the threshold'])} if {quantity}2 is the value of the exact "
+        f"motion. In the paper {quantity}_D decreases towards the threshold."
     )
     text = (
         f"{quantity}_D is at least 10 % for F0/N from {_range_text(box10['F0/N'])} and r from "

@@ -66,9 +66,9 @@ class StepStudy:
         values = [self.along(v.name, quantity) for v in SIGNS]
         by_step, by_stage = (f"from {100 * a[first]:.2g} % to {100 * a[-1]:.2g} %" for a in values)
         return (
-            "There the method without stick deviates from the exact motion. If h0 increases from "
-            f"{STEPS_PER_PERIOD} to {STEPS[-1]}, this deviation decreases. With sign by step it decreases {by_step}, "
-            f"and with sign by stage {by_stage}."
+            "On the ridge the method without stick deviates from the exact motion. If h0 increases from "
+            f"{STEPS_PER_PERIOD} to {STEPS[-1]}, this deviation decreases. With sign by step it decreases "
+            f"{by_step}, and with sign by stage {by_stage}."
         )
 
     def to_plain(self, quantity: str) -> dict[str, Any]:
