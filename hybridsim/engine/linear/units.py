@@ -24,7 +24,7 @@ def horizon_class(horizon: float) -> float:
 def scaled_modals(
     A: np.ndarray, units: np.ndarray | None, horizon: float, least: int = 0
 ) -> tuple[Modals, int]:
-    """Return the block diagonal forms of matrices (K, m, m) in units (K, m) of their variables, as `modals` does."""
+    """Return the result of `modals` for matrices (K, m, m), computed in the units (K, m) of their variables."""
     if units is None:
         return modals(A, horizon, BOUND_TERMS, multiple=LANES // 2, least=least)
     scaled = A * units[:, None, :] / units[:, :, None]

@@ -128,7 +128,7 @@ class Headway:
             )
 
     def _fades(self, now: Instant, spent: float, left: float) -> bool:
-        """Return whether a run advances less and less each time its cost doubles, and is far from its end."""
+        """Return whether a run far from its end advances hardly farther, although its cost doubled several times."""
         self._cost += spent
         if self._cost < self._twice:
             return False

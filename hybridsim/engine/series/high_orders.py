@@ -1,4 +1,4 @@
-"""This module rewrites instruction tapes for high orders, so that rates follow from states in fewer operations.
+"""This module rewrites instruction tapes for high orders, so that fewer operations in a row lead to the rates.
 
 A coefficient depends on the one before it through every operation between a state and its rate. With a
 compiled tape this latency is most of a step's time. Successive constants become one factor, a sum adds its
