@@ -154,5 +154,5 @@ class Timetable:
         return self.settled is not None and self._are_equal(instant, self.settled)
 
     def _are_equal(self, one: Instant, other: Instant) -> bool:
-        """Return whether two instants are equal within rounding, by the larger of their two rounding errors."""
+        """Return whether two instants differ by no more than the larger of their two rounding errors."""
         return abs(one.minus(other)) <= max(self._slack(one), self._slack(other))
