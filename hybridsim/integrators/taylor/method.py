@@ -108,7 +108,7 @@ class TaylorStepper:
         return Step(s0, self.s, x0, x1, dense, holds=holds)
 
     def _holds_between(self, coefficients: np.ndarray, h: float) -> bool:
-        """Return whether the series satisfy the equations inside a step; this is tested only if a rate seems constant."""
+        """Return whether the series satisfy the equations inside a step, or True if no rate seems constant."""
         moves = np.abs(coefficients[:, 2:]) @ np.abs(h) ** np.arange(2, coefficients.shape[1])
         still = moves <= self.tolerances.atol + self.series.rtol * np.abs(self.x)
         if not (still & self.computed).any():
