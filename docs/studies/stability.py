@@ -235,23 +235,24 @@ runs, whose starts are shifted by equal parts of a step. All other results of th
 {published}
 
 If the velocity is set to zero, the published setting is right in every case. Its zone is at most 4 % of the largest
-speed. In the case with 4 %, even 11 % would be right. If the velocity is kept, as in Eq. 4 of the paper, the
-setting is right for a body that never sticks. It is also right for r = 0.6 with F0/N = 0.75 and above. It is wrong
-in every other case. The error grows towards the threshold of motion, where the map of the paper has its largest
-values. For tanh with v0 = 8e-4 m/s, the result is wrong in half of the cases. The dichotomy needs only a fifth of
-the 1200 steps. If the zone is too wide, more steps do not help. `rk4-sign` may need ten times as many steps as the
-published setting.
+speed. In the case in which the zone is 4 %, even a zone of 11 % would be right. If the velocity is kept, as in Eq.
+4 of the paper, the setting is right for a body that never sticks. It is also right for r = 0.6 with F0/N = 0.75 and
+above. It is wrong in every other case. The error grows towards the threshold of motion, where the map of the paper
+has its largest values. For tanh with v0 = 8e-4 m/s, the result is wrong in half of the cases. `rk4-dichotomy` needs
+only a fifth of the 1200 steps. If its zone is too wide, more steps do not help. `rk4-sign` may need ten times as
+many steps as the published setting.
 
 ![How the boundary moves with r and F0/N](../images/stability-moves.png)
 
 *On each line the error of the amplitude is 1 %. For some zones nearly as wide as the largest speed, tanh has two
 lines, one above the other. Between these lines the error changes its sign, so a run is right there by accident.*
 
-If the velocity is set to zero, the limit of the zone is an almost constant share of the largest speed. It is 9 to 15 %
-if the body sticks, and 1 to 2 % if the body only reverses. If the velocity is kept, the limit is 0.2 to 0.8 %, and
-is smallest for long sticks. For tanh the limit is 0.15 % to 2.3 %, and follows no such rule. In m/s all limits
-decrease with the largest speed. At r = 0.6, from F0/N = 0.75 to 0.54, the limit for the velocity set to zero
-decreases from 0.034 to 0.0022 m/s. The limit for the kept velocity decreases from 1.8e-3 to 4e-5 m/s.
+If the velocity is set to zero, the limit of the zone is an almost constant share of the largest speed. It is 9 to
+15 % if the body sticks, and 1 to 2 % if the body only reverses. If the velocity is kept, the limit is 0.2 to 0.8 %,
+and is smallest for long sticks. For tanh the limit is 0.15 % to 2.3 %, and follows no such rule. In m/s, a limit is
+smaller if the largest speed is smaller. An example is r = 0.6. If F0/N decreases from 0.75 to 0.54, the limit for
+the velocity set to zero decreases from 0.034 to 0.0022 m/s. The limit for the kept velocity decreases from 1.8e-3
+to 4e-5 m/s.
 
 ![Error of rk4-sign over the step](../images/stability-sign.png)
 
@@ -302,10 +303,10 @@ grows without bound.
 to 2 mu N h/m. The error of the amplitude is of first order in h. It is larger for smaller amplitudes.
 
 **tanh.** If v0 is too large, the body creeps. If v0 is too small, RK4 is unstable. A body that should stick creeps
-at v0 artanh(e/(mu N)). At v = 0 the law has its largest rate, mu N/(m v0). Classic RK4 is stable if its step h
-times this rate is at most 2.785 (dotted line). At smaller v0, below this line, the velocity chatters. The amplitude
-becomes wrong only at a still smaller v0. The friction force is bounded by mu N. For very small v0 the result is
-therefore the same as with `rk4-sign`. Both methods then need the same number of steps.
+at the speed v0 artanh(e/(mu N)). At v = 0 the law has its largest rate, mu N/(m v0). Classic RK4 is stable if its
+step h times this rate is at most 2.785 (dotted line). At smaller v0, below this line, the velocity chatters. The
+amplitude becomes wrong only at a still smaller v0. The friction force is bounded by mu N. For very small v0 the
+result is therefore the same as with `rk4-sign`. Both methods then need the same number of steps.
 
 An adaptive method chooses its own step. The table is for `dop853` at rtol = 1e-6 and the reference model.
 

@@ -175,9 +175,9 @@ def page(found: dict[str, Counter[str]]) -> str:
             ),
             "",
             "`python docs/studies/where_time_goes.py` runs a scene of [the study of speed](speed.md) repeatedly.",
-            "The program perf records at short intervals which function is running. Each record is a "
-            "sample. A run is a call of `simulate`, followed by reading the times of all events. The",
-            f"tolerance of `taylor` is {RTOL:g}. The table gives the share of the samples in per cent. {machine()}",
+            "At short intervals the program perf takes a sample, which is the name of the function that is",
+            "running. A run is a call of `simulate`, followed by reading the times of all events. The",
+            f"tolerance of `taylor` is {RTOL:g}. The table gives the shares of the samples in per cent. {machine()}",
             "",
             f"| part | {head} |",
             "| --- |" + " --- |" * len(names),
