@@ -237,7 +237,7 @@ def test_a_span_that_ends_at_an_event_is_refused() -> None:
     """The first impact is at sqrt(2 h0/g), and moves."""
     found = bounced()
     span = (0.0, float(found.times[0]))
-    with pytest.raises(hs.UsageError, match=r"w has its extreme value at .*change of the start of h"):
+    with pytest.raises(hs.UsageError, match=r"the extreme value of w is at .*change of the start of h"):
         found.of("minimum", "w", t_span=span)
     with pytest.raises(hs.UsageError, match=r"w jumps at .*; a change of the start of h"):
         found.of("integral", "w", t_span=span)
