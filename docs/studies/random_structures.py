@@ -93,8 +93,9 @@ the errors of the runs are independent. The reason is that the steps of two runs
 common.
 
 The positions of the other method are compared with those of hybridsim at 100 times. The error of the other method
-is estimated from the differences between its runs. For a method of first order, each difference gives an error at
-the finest step. Let d be the largest of these errors. The verdicts are defined as follows:
+is estimated from the differences between its runs. The error of a method of first order is proportional to the
+step. Each difference therefore gives an estimate of the error with the most steps. Let d be the largest of these
+estimates. The verdicts are defined as follows:
 
 - A run *agrees* if it differs from the other method by at most 3 d at all times. In addition d must be below 0.5 %
   of the motion, or below 2 % in runs with the most steps. The run by the second integrator must end with the same

@@ -156,10 +156,11 @@ checks the structure of the model only once. For new numbers it does four things
 - It determines the modes at the start in compiled code.
 - It computes the tables of linear modes.
 
-`python docs/studies/repeated_runs.py` writes this page. The table gives medians of processor time. In one process
-the kinds of calls alternate. A call is a run with `keep="events"`, and includes reading the times and states of all
-events. Each new value differs from the old value in the eighth digit, so the events do not change. A call "by name"
-passes the name of the model. It is compared with a call that passes the model as an object. {machine()}
+`python docs/studies/repeated_runs.py` writes this page. The table gives medians of processor time. All calls run in
+one process, in which the kinds of calls alternate. A call is a run with `keep="events"`, and includes reading the
+times and states of all events. Each new value differs from the old value in the eighth digit, so the events do not
+change. A call "by name" passes the name of the model. It is compared with a call that passes the model as an
+object. {machine()}
 
 {table}
 

@@ -149,8 +149,8 @@ def claim(found: Reduction) -> Claim:
     return Claim(
         "figures 8, 9",
         "8, 9",
-        "at fixed F0/N, A/A0 and E/E0 do not depend on F0, with and without stick, so that the three "
-        "parameters r, N and F0 reduce to the two parameters r and F0/N",
+        "A/A0 and E/E0 depend only on r and F0/N, and not on F0 and N separately, both with stick and "
+        "without stick",
         {"spread": "constant"},
         ours,
         closest,

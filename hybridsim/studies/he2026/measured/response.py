@@ -189,8 +189,8 @@ def claim_figure_13(runs: dict[str, Response], figure_12: dict[str, Response]) -
     verdict = Verdict.REPRODUCED if near and less else Verdict.SHAPE if less else Verdict.NOT
     why = (
         "A_D is smaller than in Figure 12, as claimed, but no reading gives more than "
-        f"{100 * greatest:.2g} %. In the exact motion the body sticks for {100 * runs[EXACT].stick:.2g} % "
-        "of the period. A method without stick is therefore right in this case."
+        f"{100 * greatest:.2g} %. In the exact motion the stick fraction is {100 * runs[EXACT].stick:.2g} "
+        "%. A method without stick is therefore right in this case."
     )
     return Claim(
         "figure 13",
