@@ -401,13 +401,15 @@ For each model one process makes {runs} other runs, in random order and by rando
 - Some runs go backward in time.
 - Some runs use another model, or a second `Model` object with the same content.
 
-The *compared run* is a run of the model with its declared numbers. The same process makes it with each integrator,
-at these times:
+The *compared run* is a run of the model with its declared numbers. The same process makes it with each integrator.
+First it searches for spans over which the runs are short. The columns of the table name the times at which it makes
+the compared runs:
 
-- after a search for spans that need little run time ("after the search for spans"),
-- after 1, 30 and 1000 of the other runs, and once more after the 1000 runs ("again"),
-- after these runs, with a second `Model` object of the same content ("equal model"),
-- on one thread for each integrator at the same time, while two further threads make other runs ("on a thread").
+- *After the search for spans* means that no other run has been made.
+- *After 1*, *after 30* and *after 1000* mean that this number of other runs has been made.
+- *Again* means that the compared runs are made a second time after the 1000 runs.
+- *Equal model* means that the compared runs use a second `Model` object with the same content.
+- *On a thread* means that all integrators run at the same time on one thread each. Two further threads make other runs.
 
 The reference is the same run in a new process. This process makes no other run, and starts with an empty cache of
 compiled models. The last column of the table is for a new process that uses the cache of the process with {runs}

@@ -315,9 +315,9 @@ An adaptive method chooses its own step. The table is for `dop853` at rtol = 1e-
 {adaptives}
 
 **Karnopp's band.** The body enters the band at the speed v0. Stops are therefore too early, as with the velocity
-set to zero, and the limit is the same if the body sticks. The events are
-located, so the step has almost no effect. On the belt the body first has to cross the band, while the friction
-force is at its limit. Its slip is therefore late, and the limit is 1.1 %.
+set to zero. If the body sticks, the limit is the same too. The events are located, so the step has almost no
+effect. On the belt the body first has to cross the band, while the friction force is at its limit. Its slip is
+therefore late, and the limit is 1.1 %.
 """
 
 
