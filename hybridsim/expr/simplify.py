@@ -52,6 +52,19 @@ def is_short(e: Any) -> bool:
     )
 
 
+def factor_between(one: Any, other: Any) -> float | None:
+    """Return the number c != 0 for which one = c*other, or None if no such number is found quickly."""
+    if one.free_symbols != other.free_symbols or not one.free_symbols:
+        return None
+    if not (is_short(one) and is_short(other)):
+        return 1.0 if one == other else None
+    name = min(one.free_symbols, key=str)
+    factor = sympy.diff(one, name) / sympy.diff(other, name)
+    if not factor.is_number or not factor.is_finite or factor.is_zero:
+        return None
+    return float(factor) if sympy.expand(one - factor * other) == 0 else None
+
+
 def terms_of(e: Any) -> int:
     """Return an upper bound of the number of terms after expansion of all products."""
     if e.is_Add:

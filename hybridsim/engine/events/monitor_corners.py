@@ -4,11 +4,15 @@ Such a component is a corner, like one of ``abs``. Its two modes, ``+`` and ``-`
 negative, have the same rates. A zero of the monitor changes the mode and nothing else. The corners follow all other
 components, and their guards follow all other guards, so that both keep their numbers. A monitor that resets a state or
 ends the run has fatal guards, which the general mode loop resolves.
+
+A monitor that is a multiple of a contact's relative velocity, or of another surface function, needs no corner. The mode
+of the contact is its side: positive and negative in the two slip modes, and zero in stick.
 """
 
 from __future__ import annotations
 
 import ast
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -25,8 +29,10 @@ from hybridsim.model.parts.monitor import Monitor
 # Largest number of monitors as corners. Compiled loops store tables for each combination of sides.
 MOST = 32
 _MODES = ("+", "-")
+POSITIVE, NEGATIVE, AT_ZERO = range(3)  # sides of a monitor in the record; the first two are the modes of its corner
 _DIRECTIONS = ("down", "up")  # in which a monitor leaves the modes
 _POSITIVE = of_tree(ast.Constant(1.0))
+_SIGNS = np.array([1, -1, 0])  # of the sides
 _FATAL = "a monitor acts"  # never shown, because compiled loops leave such an event to the general loop
 
 
@@ -42,10 +48,29 @@ def _corner(name: str, monitor: Monitor) -> MonitorCorner:
     return MonitorCorner(name, tuple(modes), initial="+")
 
 
-def _with_corners(model: Model) -> Model:
-    """Return the model with a corner in place of each monitor; monitors with resets stay, but never fire."""
+def _followed(system: System) -> dict[int, tuple[int, float]]:
+    """Return the monitors whose sides follow from the mode of a component, with the component and the factor.
+
+    The monitor is the factor times the surface function of the component.
+    """
+    found = {}
+    for k, (monitor, multiple) in enumerate(
+        zip(system.model.monitors, system.code.data["monitored"], strict=True)
+    ):
+        if multiple is not None and monitor.action == "record":
+            automaton = system.automata[multiple[0]]
+            if {automaton.above, automaton.below, automaton.hold} == set(range(len(automaton.modes))):
+                found[k] = multiple
+    return found
+
+
+def _with_corners(model: Model, numbers: Sequence[int]) -> Model:
+    """Return the model with corners in place of its monitors; monitors with resets stay, but never fire.
+
+    numbers : the monitors that have a corner.
+    """
     taken, corners = set(names_of_model(model)), []
-    for monitor in model.monitors:
+    for monitor in (model.monitors[k] for k in numbers):
         name = free_name(taken, f"side_of_{monitor.name}")
         taken.add(name)
         corners.append(_corner(name, monitor))
@@ -73,38 +98,72 @@ class MonitorCorners:
     """
 
     def __init__(self, plain: System) -> None:
-        model: Model = plain.model.once("monitor corners", lambda: _with_corners(plain.model))
+        followed, count = _followed(plain), len(plain.monitor_names)
+        self._numbers = np.array([k for k in range(count) if k not in followed], dtype=np.int64)
+        with_corners: Callable[[], Model] = lambda: _with_corners(plain.model, self._numbers.tolist())
+        model: Model = plain.model.once("monitor corners", with_corners)
         self.plain, self.system = plain, System(model.with_values_of(plain.model), as_written=True)
-        self.count = len(plain.monitor_names)
         numbers = np.array([a.guards for a in self.system.automata[len(plain.automata) :]], dtype=np.int64)
-        self._guards = numbers.reshape(self.count, 2)  # of each monitor in its two modes
+        self._guards = numbers.reshape(-1, 2)  # of each corner in its two modes
+        # the monitors without corners: their numbers, their components, and by mode the side and the surface's guard
+        self._followed = np.array(list(followed), dtype=np.int64)
+        self._components = np.array([c for c, _ in followed.values()], dtype=np.int64)
+        self._factors = np.array([abs(factor) for _, factor in followed.values()])
+        self._sides, self._surfaces = (np.zeros((len(followed), 3), dtype=np.int64) for _ in range(2))
+        for row, (c, factor) in enumerate(followed.values()):
+            automaton, is_same = plain.automata[c], factor > 0.0
+            self._sides[row, automaton.above] = POSITIVE if is_same else NEGATIVE
+            self._sides[row, automaton.below] = NEGATIVE if is_same else POSITIVE
+            self._sides[row, automaton.hold] = AT_ZERO
+            for mode in (automaton.above, automaton.below):
+                self._surfaces[row, mode] = automaton.guards[mode][0]
         assert self.system.layout == plain.layout and np.array_equal(self.system.rates, plain.rates)
 
+    def sides(self, modes: np.ndarray) -> np.ndarray:
+        """Convert modes (E, C + corners) to modes and sides (E, C + M), with a column for each monitor."""
+        if not len(self._followed):
+            return modes
+        own = len(self.plain.automata)
+        found = np.empty((len(modes), own + len(self.plain.monitor_names)), dtype=np.int64)
+        found[:, :own], found[:, own + self._numbers] = modes[:, :own], modes[:, own:]
+        found[:, own + self._followed] = self._sides[range(len(self._followed)), modes[:, self._components]]
+        return found
+
     def state(self, outcome: Outcome, p: np.ndarray) -> HybridState | None:
-        """Return the state with a corner for each monitor, or None if a monitor is zero or not a number."""
-        if not outcome.monitor_sides.all():
+        """Return the state with corners for monitors, or None if the side of a monitor is not that of its modes.
+
+        Such a monitor is zero or not a number, or rounding hides its side at a surface.
+        """
+        modes = np.where(outcome.monitor_sides[self._numbers] > 0, POSITIVE, NEGATIVE)
+        z = np.concatenate([outcome.z, modes])
+        if not np.array_equal(_SIGNS[self.sides(z[None])[0, len(outcome.z) :]], outcome.monitor_sides):
             return None
-        modes = np.where(outcome.monitor_sides > 0, 0, 1)
-        active = self._guards[np.arange(self.count), modes]
+        active = self._guards[np.arange(len(modes)), modes]
         sides, orders = (np.full(self.system.guard_count, k, dtype=np.int64) for k in (1, 0))
         floors, own = np.zeros(self.system.guard_count), self.plain.guard_count
         sides[:own], orders[:own], floors[:own] = outcome.sides, outcome.orders, outcome.guard_floors
-        orders[active], floors[active] = outcome.monitor_orders, outcome.monitor_floors
-        z = np.concatenate([outcome.z, modes])
+        orders[active] = outcome.monitor_orders[self._numbers]
+        floors[active] = outcome.monitor_floors[self._numbers]
         return HybridState.of(replace(outcome, z=z, sides=sides, orders=orders, guard_floors=floors), p)
 
     def outcome(self, state: HybridState) -> Outcome:
         """Convert a state of the system with corners to an outcome of the model with monitors."""
         whole, own, components = state.outcome(), self.plain.guard_count, len(self.plain.automata)
-        modes = whole.z[components:]
-        active = self._guards[np.arange(self.count), modes]
+        sides = _SIGNS[self.sides(whole.z[None])[0, components:]]
+        active = self._guards[np.arange(len(self._numbers)), whole.z[components:]]
+        orders, floors = np.zeros(len(sides), dtype=np.int64), np.zeros(len(sides))
+        orders[self._numbers], floors[self._numbers] = whole.orders[active], whole.guard_floors[active]
+        at_surface = self._surfaces[range(len(self._followed)), whole.z[self._components]]
+        is_off = sides[self._followed] != 0
+        orders[self._followed] = np.where(is_off, whole.orders[at_surface], 0)
+        floors[self._followed] = np.where(is_off, self._factors * whole.guard_floors[at_surface], 0.0)
         return replace(
             whole,
             z=whole.z[:components],
             sides=whole.sides[:own],
             orders=whole.orders[:own],
             guard_floors=whole.guard_floors[:own],
-            monitor_sides=1 - 2 * modes,
-            monitor_orders=whole.orders[active],
-            monitor_floors=whole.guard_floors[active],
+            monitor_sides=sides,
+            monitor_orders=orders,
+            monitor_floors=floors,
         )

@@ -263,6 +263,7 @@ class Emitter:
             "rates": len(program.rates),
             "of_waves": tuple(program.periods),
             "linear": program.linear,
+            "monitored": program.monitored,
             "quantities": tuple(n for n, _ in self.quantities()),
             "resets": tuple((key, tuple(mapping)) for key, mapping in resets_of(program.model)),
             "effects_read": parameters_read(program, self.lowering.effects),

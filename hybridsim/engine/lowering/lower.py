@@ -19,7 +19,7 @@ from hybridsim.engine.lowering.shared_rates import refuse_changed_rates, shared_
 from hybridsim.engine.lowering.stop_coupling import StopCoupling, coupling_help, stop_couplings, without_share
 from hybridsim.engine.series.layout import Layout
 from hybridsim.errors import ModelError
-from hybridsim.expr.simplify import is_short, simplified, written_out
+from hybridsim.expr.simplify import factor_between, is_short, simplified, written_out
 from hybridsim.expr.symbolic import without_distributions
 from hybridsim.model.parts.model import Model
 from hybridsim.model.parts.switching import ATTRACTION
@@ -42,6 +42,7 @@ class Program:
     stop_couplings: list[StopCoupling]  # gaps with friction contacts along them
     jumps: list[tuple[int, Any, Any]]  # (component, jump above, jump below)
     linear: dict[str, tuple[bool, ...]]  # component -> whether the flow is linear in the states, by mode
+    monitored: tuple[tuple[int, float] | None, ...]  # of each monitor: its surface, and the factor between both
     conditions: dict[tuple[int, int, int], tuple[Any, ...]] = field(default_factory=dict)
     layout: Layout = field(init=False)
 
@@ -98,6 +99,10 @@ class Lowering(LoweringState):
             self.stop_couplings,
             [self._jump(c) for c in surfaces],
             affine_modes(self, der, definitions, surfaces),
+            tuple(
+                multiple_of(self.inline(self.convert(m.expr), definitions | signals), surfaces)
+                for m in model.monitors
+            ),
             conditions,
         )
         return program
@@ -358,3 +363,11 @@ class Lowering(LoweringState):
             return simplified(sp.nsimplify(self.convert(e), rational=True))
 
         return c, reduced(surface.jump_above), reduced(surface.jump_below)
+
+
+def multiple_of(e: Any, surfaces: dict[int, Any]) -> tuple[int, float] | None:
+    """Return the component whose surface function times a number is an expression, with this number, or None."""
+    for c, surface in surfaces.items():
+        if (factor := factor_between(e, surface)) is not None:
+            return c, factor
+    return None

@@ -35,13 +35,13 @@ def _taking_part(
 
     A participant is a component that changes its mode or is reset, a monitor, or a schedule that is due.
     may_return (C,): whether an event of the component may leave its mode unchanged. before, after (E, C) or (E, C + M):
-    modes of the components, and of the corners of monitors if there are any.
-    due_start, due: the schedules of each kind of known time. recorded (2 M,): the directions, down and up, that each
-    monitor records. participants (2, m): receives event and number of each, up to its length; monitors follow the
+    modes of the components, and sides of the monitors if there are any.
+    due_start, due: the schedules of each kind of known time. recorded (3 M,): whether each
+    monitor records that it leaves its positive side, its negative side, and zero. participants (2, m): receives event and number of each, up to its length; monitors follow the
     components, and schedules follow the monitors.
     """
     count, others, is_plain = 0, 0, True
-    components, guards, monitors = may_return.shape[0], owner.shape[0], recorded.shape[0] // 2
+    components, guards, monitors = may_return.shape[0], owner.shape[0], recorded.shape[0] // 3
     for e in range(fired.shape[0]):
         first = owner[fired[e]] if 0 <= fired[e] < guards and may_return[owner[fired[e]]] else components
         if first < components:  # its reset or impact precedes the changes that follow from it
@@ -54,7 +54,7 @@ def _taking_part(
                     participants[0, count], participants[1, count] = e, c
                 count += 1
         for m in range(components, before.shape[1]):
-            if before[e, m] != after[e, m] and recorded[2 * (m - components) + before[e, m]]:
+            if before[e, m] != after[e, m] and recorded[3 * (m - components) + before[e, m]]:
                 if count < participants.shape[1]:
                     participants[0, count], participants[1, count] = e, m
                 count, others = count + 1, others + 1
@@ -93,7 +93,8 @@ def _states_at(states: Any, participants: Any, first: int, component: int, side:
 
 
 SCHEDULED, MONITOR = "scheduled", "monitor"  # kinds of the events of schedules and monitors
-_DIRECTIONS = ("down", "up")  # in which a monitor leaves the two modes of its corner
+# directions in which a monitor fires if it leaves its positive side, its negative side, and zero
+_DIRECTIONS = (("both", "down"), ("both", "up"), ())
 _NO_KINDS = np.zeros(1, dtype=np.int64), np.zeros(0, dtype=np.int64)  # of known times, as arrays
 _take_part, _times_of_one = Precompiled(_taking_part), Precompiled(_times_at)
 
@@ -108,8 +109,8 @@ class EventBlock(Sequence[Occurrence]):
     instants : (E, 2), high and low.
     fired : (E,), number of the guard that fired; -1 for none; AT_KNOWN_TIME - k for kind k of a known time. The guards
         of the corners of monitors follow those of the components.
-    before, after : (E, C) or (E, C + M), modes on both sides. Those of the corners of monitors are 0 while a monitor
-        is positive, and 1 while it is negative.
+    before, after : (E, C) or (E, C + M), modes on both sides. Those of monitors are 0 while a monitor is positive, 1
+        while it is negative, and 2 while it stays at zero.
     states : (E, 2, n), x- and x+.
     due : the schedules of each kind of known time.
     """
@@ -132,7 +133,7 @@ class EventBlock(Sequence[Occurrence]):
         kinds = _NO_KINDS
         if due:
             kinds = np.cumsum([0, *map(len, due)]), np.array([k for one in due for k in one], dtype=np.int64)
-        recorded = [m.direction in ("both", way) for m in system.model.monitors for way in _DIRECTIONS]
+        recorded = [m.direction in ways for m in system.model.monitors for ways in _DIRECTIONS]
         may_return = ~system.has_surface | system.is_unilateral  # a reset or an impact
         arrays = (
             fired, before, after, system.owner, may_return, *kinds, np.array(recorded, dtype=np.bool_)

@@ -210,14 +210,16 @@ class KernelRun:
     def event_block(self) -> EventBlock | None:
         """Return the events as one block, or None if there are none."""
         if self._event_block is None and self.events:
-            modes, ended = self._array("modes"), self._ended
+            ended = self._ended
             after = slice(ended.start + 1, ended.stop + 1)
+            modes = self._array("modes")[ended.start : after.stop]
+            modes = modes if self.corners is None else self.corners.sides(modes)
             self._event_block = EventBlock(
                 self.system,
                 self._array("clocks")[after],
                 self._fires[ended],
-                modes[ended],
-                modes[after],
+                modes[:-1],
+                modes[1:],
                 self._array("jumps")[ended, -2:],  # the states at its end, after the state at its start
                 self.known.due if self.known is not None and self.passed else (),
             )

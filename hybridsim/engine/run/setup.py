@@ -127,7 +127,7 @@ class RunSetup:
         if self._start is None:
             outcome = settled_start(system, task, self.origin, due)
             is_recorded = bool(due or outcome.changes or outcome.warnings or outcome.status)
-            self.begins_silently = forward and not is_recorded and bool(outcome.monitor_sides.all())
+            self.begins_silently = forward and not is_recorded
             self._start = outcome, system.vector(self.origin, system.discrete(outcome.p), forward)
         return self._start
 
