@@ -12,7 +12,7 @@ import pytest
 import sympy
 
 from hybridsim.expr import evaluate, parse
-from hybridsim.expr.simplify import simplified, terms_of
+from hybridsim.expr.simplify import factor_between, simplified, terms_of
 from hybridsim.expr.symbolic import derivative, to_sympy
 
 SYMBOLS = {name: sympy.Symbol(name, real=True) for name in "abuvwx"}
@@ -103,3 +103,27 @@ def test_terms_are_counted_as_if_products_were_written_out() -> None:
     assert terms_of(e) == 3 * 2**2 * 2
     assert terms_of(e) >= len(sympy.expand(e).args)
     assert terms_of(form("a/(b + u)")) == 2
+
+
+@pytest.mark.parametrize(
+    ("one", "factor"),
+    [
+        ("v - a*w", 1.0),
+        ("a*w - v", -1.0),
+        ("-2.5*(v - a*w)", -2.5),
+        ("a*(v/a - w)", 1.0),
+        ("v + a*w", None),
+        ("v", None),
+        ("u*(v - a*w)", None),
+        ("(v - a*w)**2", None),
+        ("0*v", None),
+        ("3", None),
+    ],
+)
+def test_the_factor_between_two_expressions_is_a_number(one: str, factor: float | None) -> None:
+    assert factor_between(to_sympy(parse(one), SYMBOLS), to_sympy(parse("v - a*w"), SYMBOLS)) == factor
+
+
+def test_the_factor_between_nonlinear_expressions() -> None:
+    one, other = (to_sympy(parse(text), SYMBOLS) for text in ("3*sin(v)*x - 3*a", "x*sin(v) - a"))
+    assert factor_between(one, other) == 3.0

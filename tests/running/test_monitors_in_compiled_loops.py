@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
 
@@ -157,3 +158,71 @@ def test_a_model_with_friction_has_the_events_of_the_general_loop(
     motion = [e for e in events_of(fast) if e[1] == "transition"]
     assert [e[0] for e in motion] == [e[0] for e in events_of(bare)]
     assert np.allclose([e[3] for e in motion], [e[3] for e in events_of(bare)], rtol=0, atol=1e-10)
+
+
+SPEEDS = (
+    hs.Monitor("any", "v"),
+    hs.Monitor("opposite", "-2*v"),
+    hs.Monitor("rising", "0.3*v", direction="up"),
+    hs.Monitor("falling", "v", direction="down"),
+)
+# directions of these monitors at the turning points pi, 2 pi, ... of the model free-decay, which stops at 5 pi
+TURNS = [
+    (name, way, k * math.pi)
+    for k in range(1, 6)
+    for name, way in (("any", 1), ("opposite", -1), ("rising", 1), ("falling", -1))
+    for way in [way if k % 2 == 1 or name in ("rising", "falling") else -way]
+    if name in ("any", "opposite") or (way > 0) == (k % 2 == 1)
+]
+
+
+def fired(events: Iterable[Any]) -> list[tuple[str, int, Any]]:
+    """Names, directions and times of the monitors that fired."""
+    return [(e.component, e.direction, pytest.approx(e.t, abs=1e-11)) for e in events if e.kind == "monitor"]
+
+
+@pytest.mark.parametrize("integrator", METHODS)
+def test_a_monitor_of_the_sliding_speed_fires_at_the_turning_points_in_one_compiled_call(
+    integrator: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def never(*_: Any) -> None:
+        raise AssertionError("the mode loop was entered")
+
+    model = replace(hs.load("free-decay"), monitors=SPEEDS)
+    monkeypatch.setattr(single_call, "ModeLoop", never)
+    solution = hs.simulate(model, (0, 20), integrator=integrator, rtol=1e-12, atol=1e-13)
+    assert fired(solution.events) == TURNS
+    assert abs(solution["x"][-1] + 0.5) < 1e-10 and solution["v"][-1] == 0.0
+
+
+@pytest.mark.parametrize("integrator", METHODS)
+def test_a_monitor_of_the_sliding_speed_keeps_its_side_between_calls(integrator: str) -> None:
+    model = replace(hs.load("free-decay"), monitors=SPEEDS)
+    sim = hs.Simulator(model, integrator=integrator, rtol=1e-12, atol=1e-13)
+    sim.start(0.0)
+    events = [event for k in range(1, 41) for event in sim.advance(0.5 * k)]
+    assert fired(events) == TURNS
+
+
+@pytest.mark.parametrize("integrator", METHODS)
+def test_a_monitor_of_the_sliding_speed_that_acts_ends_the_run(integrator: str) -> None:
+    monitors = (hs.Monitor("turn", "-v", direction="up", action="terminate"), hs.Monitor("half", "v"))
+    solution = hs.simulate(replace(hs.load("free-decay"), monitors=monitors), (0, 20), integrator=integrator)
+    assert solution.status == "terminated" and abs(solution.t_end - 2.0 * math.pi) < 1e-4
+
+
+@pytest.mark.parametrize("integrator", METHODS)
+def test_a_monitor_of_the_sliding_speed_has_the_events_of_the_general_loop(
+    integrator: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    model = replace(
+        hs.load("dfcs"), monitors=(*SPEEDS, hs.Monitor("half", "x - 1e-4"), hs.Monitor("late", "v"))
+    )
+
+    def run(of: hs.Model) -> hs.Solution:
+        return hs.simulate(of, (0, 0.1), integrator=integrator, rtol=1e-12, atol=1e-13)
+
+    fast, slow = run(model), in_python(monkeypatch, lambda: run(replace(model)))
+    assert [e[:3] for e in events_of(fast)] == [e[:3] for e in events_of(slow)]
+    assert np.allclose([e[3] for e in events_of(fast)], [e[3] for e in events_of(slow)], rtol=0, atol=1e-11)
+    assert np.allclose(fast.y[:, -1], slow.y[:, -1], rtol=1e-9, atol=1e-12)

@@ -12,7 +12,7 @@ of the contact is its side: positive and negative in the two slip modes, and zer
 from __future__ import annotations
 
 import ast
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -29,7 +29,9 @@ from hybridsim.model.parts.monitor import Monitor
 # Largest number of monitors as corners. Compiled loops store tables for each combination of sides.
 MOST = 32
 _MODES = ("+", "-")
-POSITIVE, NEGATIVE, AT_ZERO = range(3)  # sides of a monitor in the record; the first two are the modes of its corner
+POSITIVE, NEGATIVE, AT_ZERO = range(
+    3
+)  # sides of a monitor in the record; the first two are the modes of its corner
 _DIRECTIONS = ("down", "up")  # in which a monitor leaves the modes
 _POSITIVE = of_tree(ast.Constant(1.0))
 _SIGNS = np.array([1, -1, 0])  # of the sides
@@ -100,8 +102,8 @@ class MonitorCorners:
     def __init__(self, plain: System) -> None:
         followed, count = _followed(plain), len(plain.monitor_names)
         self._numbers = np.array([k for k in range(count) if k not in followed], dtype=np.int64)
-        with_corners: Callable[[], Model] = lambda: _with_corners(plain.model, self._numbers.tolist())
-        model: Model = plain.model.once("monitor corners", with_corners)
+        numbered = self._numbers.tolist()
+        model: Model = plain.model.once("monitor corners", lambda: _with_corners(plain.model, numbered))
         self.plain, self.system = plain, System(model.with_values_of(plain.model), as_written=True)
         numbers = np.array([a.guards for a in self.system.automata[len(plain.automata) :]], dtype=np.int64)
         self._guards = numbers.reshape(-1, 2)  # of each corner in its two modes

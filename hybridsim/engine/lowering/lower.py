@@ -42,7 +42,7 @@ class Program:
     stop_couplings: list[StopCoupling]  # gaps with friction contacts along them
     jumps: list[tuple[int, Any, Any]]  # (component, jump above, jump below)
     linear: dict[str, tuple[bool, ...]]  # component -> whether the flow is linear in the states, by mode
-    monitored: tuple[tuple[int, float] | None, ...]  # of each monitor: its surface, and the factor between both
+    monitored: tuple[tuple[int, float] | None, ...]  # surface of each monitor, and the factor between both
     conditions: dict[tuple[int, int, int], tuple[Any, ...]] = field(default_factory=dict)
     layout: Layout = field(init=False)
 

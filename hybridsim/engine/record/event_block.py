@@ -36,9 +36,9 @@ def _taking_part(
     A participant is a component that changes its mode or is reset, a monitor, or a schedule that is due.
     may_return (C,): whether an event of the component may leave its mode unchanged. before, after (E, C) or (E, C + M):
     modes of the components, and sides of the monitors if there are any.
-    due_start, due: the schedules of each kind of known time. recorded (3 M,): whether each
-    monitor records that it leaves its positive side, its negative side, and zero. participants (2, m): receives event and number of each, up to its length; monitors follow the
-    components, and schedules follow the monitors.
+    due_start, due: the schedules of each kind of known time. recorded (3 M,): whether each monitor records that it
+    leaves its positive side, its negative side, and zero. participants (2, m): receives event and number of each, up to
+    its length; monitors follow the components, and schedules follow the monitors.
     """
     count, others, is_plain = 0, 0, True
     components, guards, monitors = may_return.shape[0], owner.shape[0], recorded.shape[0] // 3
