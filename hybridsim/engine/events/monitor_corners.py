@@ -29,7 +29,7 @@ from hybridsim.model.parts.monitor import Monitor
 # Largest number of monitors as corners. Compiled loops store tables for each combination of sides.
 MOST = 32
 _MODES = ("+", "-")
-POSITIVE, NEGATIVE, AT_ZERO = range(
+POSITIVE, NEGATIVE, ZERO = range(
     3
 )  # sides of a monitor in the record; the first two are the modes of its corner
 _DIRECTIONS = ("down", "up")  # in which a monitor leaves the modes
@@ -116,7 +116,7 @@ class MonitorCorners:
             automaton, is_same = plain.automata[c], factor > 0.0
             self._sides[row, automaton.above] = POSITIVE if is_same else NEGATIVE
             self._sides[row, automaton.below] = NEGATIVE if is_same else POSITIVE
-            self._sides[row, automaton.hold] = AT_ZERO
+            self._sides[row, automaton.hold] = ZERO
             for mode in (automaton.above, automaton.below):
                 self._surfaces[row, mode] = automaton.guards[mode][0]
         assert self.system.layout == plain.layout and np.array_equal(self.system.rates, plain.rates)
