@@ -137,12 +137,10 @@ How much do monitors, clocks, tables and impacts add to the time of a run? With 
 run takes {min(never):.2f} to {max(never):.2f} times as long as without it.
 
 `exact`, `taylor` and `dop853` run from event to event in compiled code. There an ordinary event takes a few
-microseconds. Other events take about a millisecond, because Python code handles them. An example is an event at
-which the modes of several components are selected together. Python code handles these parts of the table:
-
-- With `exact`, the quadratic monitor. A quadratic expression is not one of the closed forms of `exact`.
-- The monitor of the sliding speed. It is zero at the same times as the guard of the contact, so the monitor and the
-  contact have an event together.
+microseconds. Other events take about a millisecond, because Python code handles them. An example is an event at which
+the modes of several components are selected together. With `exact`, Python code handles the quadratic monitor,
+because a quadratic expression is not one of its closed forms. A monitor of the sliding speed costs little: its sign
+is the mode of the contact.
 
 An impact at a single contact is an ordinary event. Python code handles an impact that strikes several contacts or
 loads friction.
