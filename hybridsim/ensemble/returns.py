@@ -28,6 +28,14 @@ def measure_scale(extremes: Any, seen: Any, scale: Any) -> None:
 
 
 @inlined
+def remember_sizes(states: Any, count: int, seen: Any) -> None:
+    """Update the largest scales so far by the sizes of the states (count, n) at the starts of periods."""
+    for row in range(count):
+        for i in range(seen.shape[0]):
+            seen[i] = max(seen[i], _DIGITS * abs(states[row, i]))
+
+
+@inlined
 def relative_change(before: Any, after: Any, scale: Any) -> float:
     """Return the largest change of a state relative to its scale; states without a scale are ignored."""
     largest = 0.0

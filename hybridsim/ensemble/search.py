@@ -31,6 +31,7 @@ from hybridsim.ensemble.returns import (
     nearest_return,
     periods_left,
     relative_change,
+    remember_sizes,
     repeats_after,
 )
 
@@ -41,7 +42,8 @@ _NEEDS_NEWTON = -1  # result of `search_point`
 _FEWEST = 8  # periods that take as long as Newton's method
 _MARGIN = 1.1  # on the expected number of periods
 _NEAR = 1e-6  # of a period: an event this close to its end may move onto it while the motion settles
-_HARDLY = 1e-9  # of its size: a state that moves by less may be at rest
+# a motion may be rest if each state moves by less than this part of the largest state, or of its own former motion
+_HARDLY = 1e-9
 _MAX_SEGMENTS = 1 << 17  # most segments of one search, some tens of milliseconds
 _SEGMENTS_PER_CALL = 1 << 18  # after these a call returns, so that it can be interrupted
 
@@ -109,6 +111,8 @@ def search_point(
     period, states, scale = searches.points.periods[i], scratch.states, scratch.scale
     counts, before = searches.counts[i], searches.at[SEGMENTS_DONE]
     fill(scratch.seen, 0.0)
+    put(searches.points.starts[i], states[0])
+    remember_sizes(states, 1, scratch.seen)
     expected, followed, segments, multiple, is_found = first_periods, 0, 0, 0, False
     while not is_found:
         if not (followed < most and searches.at[SEGMENTS_DONE] - before < _MAX_SEGMENTS):
@@ -123,6 +127,7 @@ def search_point(
             begin_segment(packs.state)
         followed += count
         counts[FOLLOWED] = followed
+        remember_sizes(states, count, scratch.seen)
         if _summarise(packs, fixed, segments, scratch) == 0:
             return UNDECIDED
         measure_scale(scratch.found.extremes, scratch.seen, scale)
@@ -180,9 +185,11 @@ def _store(packs: Any, fixed: Any, searches: Any, i: int, scratch: Any, found: A
     searches.counts[i, MULTIPLE] = multiple
     put(record.jumps[0, 0], searches.points.starts[i])
     put(record.modes[0], searches.modes[i])
-    extremes, rests, hardly = scratch.found.extremes, True, True
+    extremes, rests, hardly, largest = scratch.found.extremes, True, True, 0.0
+    for j in range(state.x.shape[0]):
+        largest = max(largest, abs(extremes[0, j]), abs(extremes[1, j]))
     for j in range(state.x.shape[0]):
         range_of = extremes[1, j] - extremes[0, j]
         rests = rests and range_of == 0.0
-        hardly = hardly and range_of <= _HARDLY * max(abs(extremes[0, j]), abs(extremes[1, j]))
+        hardly = hardly and range_of <= _HARDLY * max(largest, scratch.seen[j])
     return RESTS if rests else UNDECIDED if hardly else PERIODIC

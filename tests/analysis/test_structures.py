@@ -14,7 +14,7 @@ import hybridsim as hs
 from hybridsim.analysis.extrapolation.growth import grows
 from hybridsim.analysis.extrapolation.settling import Settling
 from hybridsim.analysis.structures.period_map import PeriodMap
-from hybridsim.errors import UsageError
+from hybridsim.errors import SimulationError, UsageError
 
 _FORCE, _PHASE, _DAMPING = 2.0, 0.3, 0.1
 
@@ -378,3 +378,53 @@ def test_growth_near_one_is_told_from_a_neutral_direction(growth: float, expecte
     linear.x = np.zeros(2)
     assert grows(linear, np.ones(2), 1, np.array([0.3, 1.0])) is expected
     assert (linear.x == 0.0).all() is not expected
+
+
+class _Bounded(_Logistic):
+    """A map x -> 0.95 x - 0.05 above 0.1, which seems to lead to -1, and x -> x/2 below; it ends below -1/2."""
+
+    def advance(self) -> np.ndarray:
+        x = float(self.x[0])
+        if x < -0.5:
+            raise SimulationError("the run ended early")
+        self.x = np.array([0.95 * x - 0.05 if x > 0.1 else 0.5 * x, 0.9 * self.x[1]])
+        self.periods += 1
+        return self.x
+
+
+def test_an_extrapolation_from_which_no_motion_is_possible_is_taken_back() -> None:
+    """The plain map goes to 0."""
+    settled = Settling(_Bounded(0.0, 1.0), 1e-10, 8, 4096).run(None)
+    assert settled.multiple == 1
+    assert settled.passings.values[-1] == pytest.approx([0.0, 0.0], abs=1e-9)
+
+
+def test_an_error_without_an_extrapolation_is_raised() -> None:
+    with pytest.raises(SimulationError, match="ended early"):
+        Settling(_Bounded(0.0, -1.0), 1e-10, 8, 4096).run(None)
+
+
+def test_an_irregular_motion_on_a_belt_is_followed_to_the_end() -> None:
+    """Extrapolations of this motion lead to a speed beyond that of the belt, where its law of slip has no value.
+
+    No return of a plain run of the ordinary model after 1 to 12 periods is closer than a hundredth of its range.
+    """
+    omega, law = 0.46837251464233887, {"mu_s": 0.4633155482553021, "mu_k": 0.1458705950675895}
+    stiffness, mass = 3.365139835572482, 1.0 / 0.822008215171591
+    contact = hs.MechanicalContact(
+        "f", {0: 1.0}, 1.0, "stribeck", law | {"v_s": 0.14944210120311124}, base=0.2
+    )
+    system = hs.MechanicalSystem(
+        [mass],
+        [[0.05687695191018334 * mass]],
+        [[stiffness * mass]],
+        {0: hs.Harmonic(omega, sin=1.629451451467802 * mass)},
+        [contact],
+    )
+    found = hs.steady_state(system, max_periods=1300)
+    period, model = 2.0 * math.pi / omega, system.to_model()
+    plain = hs.simulate(model, (0.0, 300.0 * period), integrator="dop853", rtol=1e-10)
+    places = plain(period * np.arange(200, 300))[0]
+    returns = [np.abs(places[m:] - places[:-m]).max() for m in range(1, 13)]
+    assert min(returns) > 0.01 * np.ptp(places) > 0.0
+    assert found.kind == "not settled"

@@ -2,7 +2,8 @@
 
 A run of plain periods is followed as long as the states change. If the sequence of events is the same in
 consecutive periods, the period map is smooth there, and the states are extrapolated to their limit. The
-extrapolation counts only if the following plain periods change the states less than those before it.
+extrapolation counts only if the following plain periods change the states less than those before it. It is taken back
+otherwise, and also if no motion is possible from the extrapolated states.
 
 A contact that slips less in each period, until its force only just reaches the limit, approaches its place like
 1/k after k periods. There the change falls with the square of the distance, and the extrapolation has to go
@@ -24,6 +25,7 @@ from hybridsim.analysis.extrapolation.limit import limit_of
 from hybridsim.analysis.extrapolation.period_map import PeriodMap
 from hybridsim.analysis.steady.motion import Point
 from hybridsim.analysis.steady.settling import Passings, relative
+from hybridsim.errors import SimulationError
 
 _EVERY = 4  # periods between tests
 _COUNTS = (4, 8, 16, 32, 64, 128)  # periods in an extrapolation
@@ -92,16 +94,18 @@ class Settling:
 
     def run(self, progress: Callable[[float], None] | None) -> Settled:
         """Follow the motion to its end, at most for the allowed number of periods."""
-        since = 0
         while True:
-            self._follow(self.map.advance)
-            since += 1
-            if progress is not None:
-                progress(min(self.map.periods / self.max_periods, 1.0))
-            if self.map.periods < self.settle or since < _EVERY:
+            try:
+                for _ in range(max(_EVERY, self.settle - self.map.periods)):
+                    self._follow(self.map.advance)
+                    if progress is not None:
+                        progress(min(self.map.periods / self.max_periods, 1.0))
+                passings, rests = self._passings()
+            except SimulationError:
+                if self._trial is None:
+                    raise
+                self._take_back(self._trial)  # no motion is possible from the extrapolated states
                 continue
-            since = 0
-            passings, rests = self._passings()
             if not self._end_trial(passings.scale):
                 continue
             multiple = 1 if rests else self._multiple(passings)
@@ -176,12 +180,17 @@ class Settling:
             self._is_squared = self._beyond > 0.0 or _SQUARED[0] < ratio < _SQUARED[1]
             self._beyond = _TWICE if self._is_squared else 0.0
             return True
+        self._take_back(trial)
+        return False
+
+    def _take_back(self, trial: _Trial) -> None:
+        """Return to the states before an extrapolation that failed."""
+        self._trial = None
         self.map.restore(trial.former)
         self._states, self._pairs, self._fresh = trial.states, trial.pairs, trial.fresh
         self._events = trial.events
         self._beyond, self._is_exhausted = 0.0, True
         self._wait, self._waited = max(_EVERY, self._fresh // 2), 0
-        return False
 
     def _attracts(self, passings: Passings, multiple: int) -> bool:
         """Return whether a disturbance in the slowest direction decays; if it grows, keep the disturbed motion."""

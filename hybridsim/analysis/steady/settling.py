@@ -140,17 +140,21 @@ def forced_scale_of(solution: Solution, since: float) -> np.ndarray:
     return scale
 
 
-def forced_passings(motion: Motion, start: Point | None, period: float, count: int, phase: float) -> Passings:
+def forced_passings(
+    motion: Motion, start: Point | None, period: float, count: int, phase: float, largest: np.ndarray
+) -> Passings:
     """Return the states at one phase of consecutive forcing periods.
 
     If an event is at this phase, the section moves to an event-free phase, and the motion is followed as long again.
+    largest (n,): the largest scale of each state so far, updated here.
     """
     solution = motion.run(start, (phase if start is None else 0.0) + count * period)
+    np.maximum(largest, scale_of(solution, solution.t_start)[: len(largest)], out=largest)
     offset = quiet_offset(solution, period)
     if offset > 0.0:
         place = point_at(solution, solution.t_end - period + offset)
         moved = (phase + offset) % period
-        return forced_passings(motion, replace(place, at=moved), period, count, moved)
+        return forced_passings(motion, replace(place, at=moved), period, count, moved, largest)
     times = phase + period * np.arange(1, count + 1)
     times[-1] = solution.t_end
     values = solution(times, side="-").T
@@ -247,11 +251,32 @@ def _drifts_steadily(solution: Solution, moves: np.ndarray, steady: float) -> np
     return np.asarray(is_steady & (np.abs(steps.sum(axis=1)) >= (1.0 - _STEADY) * moves) & (moves > 0.0))
 
 
+def is_rest(motion: Motion, start: Point, period: float, largest: np.ndarray, followed: int) -> bool:
+    """Return whether all motion along a closed orbit is within rounding errors, or dies out.
+
+    A motion far below the largest scale (n,) of each state may be one of its own, or the last part of a decay. It is
+    followed for a part of the periods that were `followed`: a decay becomes smaller.
+    """
+    solution = motion.run(start, period)
+    held = [segment.p[solution._system.layout.discrete_slice] for segment in solution._segments]
+    if any((values != held[0]).any() for values in held):
+        return False
+    moves = np.subtract(*ranges(solution)[::-1])
+    sizes = np.maximum(motion.coupled_sizes(start), shared_sizes(solution, solution.t_start))
+    is_rounding = moves <= rounding_of(sizes, motion.rtol)
+    if is_rounding.all() or not (is_rounding | (moves <= _ROUNDED * largest)).all():
+        return bool(is_rounding.all())
+    later = motion.run(start, math.ceil(1 + _FOLLOWED * followed) * period)
+    left = np.subtract(*ranges(later, later.t_end - period)[::-1])
+    return bool((is_rounding | (left <= 0.5 * moves)).all())
+
+
 def died_out(low: np.ndarray, high: np.ndarray, largest: np.ndarray) -> bool:
     """Return whether the states vary so little between `low` and `high` that the motion has decayed."""
     return bool((high - low <= _DIED_OUT * largest).all())
 
 
 _DIED_OUT, _ROUNDED = 1e-9, 1e-13
+_FOLLOWED = 0.125  # of the periods in which a motion decayed to `_ROUNDED`: it decays at least to a thirtieth
 _LONGER = 2  # factor of the duration
 RESTS = 1e-12  # relative to its largest size; a state at rest moves by less

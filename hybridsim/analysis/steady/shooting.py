@@ -45,13 +45,21 @@ class Orbit:
     attracts: bool = True
 
 
-def shoot(motion: Motion, start: Orbit, scale: np.ndarray, section: int | None, tol: float) -> Orbit:
+def shoot(
+    motion: Motion,
+    start: Orbit,
+    scale: np.ndarray,
+    section: int | None,
+    tol: float,
+    in_family: bool = False,
+) -> Orbit:
     """Find a periodic orbit near a given start by Newton's method.
 
     Parameters
     ----------
     scale : (n + d,) size of each state and discrete state.
     section : None if the period is known; else the state that keeps its value while the period is found.
+    in_family : whether an orbit with a multiplier of 1, which has neighbours of the same period, counts as attracting.
     """
     best = replace(start, residual=np.inf, converged=False)
     orbit = start
@@ -73,7 +81,7 @@ def shoot(motion: Motion, start: Orbit, scale: np.ndarray, section: int | None, 
         if section is not None:
             rates = rates_at_end(solution)
         move, longer = _newton(matrix, change, scale, section, rates)
-        best = replace(orbit, residual=residual, steps=count, attracts=_attracts(matrix, rates))
+        best = replace(orbit, residual=residual, steps=count, attracts=_attracts(matrix, rates, in_family))
         # The remaining error is the step itself.
         if residual <= tol and relative(move, scale) <= tol and abs(longer) <= tol * orbit.period:
             attracts = best.attracts and not lies_on_a_guard(solution, scale)
@@ -124,8 +132,10 @@ def _newton(
     return unit * found[:count], float(found[count])
 
 
-def _attracts(matrix: np.ndarray, rates: np.ndarray | None) -> bool:
-    return bool((np.abs(multipliers(matrix, rates)) <= _ATTRACTS).all())
+def _attracts(matrix: np.ndarray, rates: np.ndarray | None, in_family: bool) -> bool:
+    found = multipliers(matrix, rates)
+    is_neutral = in_family & (np.abs(found - 1.0) <= 1.0 - _ATTRACTS)
+    return bool((is_neutral | (np.abs(found) <= _ATTRACTS)).all())
 
 
 def rates_at_end(solution: Solution) -> np.ndarray:

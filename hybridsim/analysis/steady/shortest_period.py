@@ -21,7 +21,8 @@ def with_shortest_period(
     """Return the orbit with its shortest period; the period found before may be a multiple of it.
 
     Near a doubling of the period, one passage does not return to the start within the tolerance. Then Newton's method
-    decides whether an attracting orbit with the shorter period is there. After a doubling it no longer attracts.
+    decides whether an orbit with the shorter period is there. After a doubling it no longer attracts. It may be one of
+    a family, as with a contact that sticks for the whole period, because the motion has reached this member.
     """
     for divisor in range(1, orbit.multiple):
         if orbit.multiple % divisor:
@@ -39,7 +40,7 @@ def with_shortest_period(
             rates = rates_at_end(solution)
             unit = np.where(scale > 0.0, scale, 1.0)[: len(rates)]
             section = None if is_forced else int(np.argmax(np.abs(rates) / unit))
-            found = shoot(motion, shorter, scale, section, tol)
+            found = shoot(motion, shorter, scale, section, tol, in_family=True)
             if found.converged and found.attracts:
                 return replace(found, steps=orbit.steps + found.steps)
     return orbit

@@ -27,13 +27,13 @@ from hybridsim.analysis.steady.period_argument import (
     require_multiple,
 )
 from hybridsim.analysis.steady.result import SteadyState
-from hybridsim.analysis.steady.scales import rounding_of, shared_sizes
 from hybridsim.analysis.steady.settling import (
     CLOSER,
     Passings,
     died_out,
     forced_passings,
     free_passings,
+    is_rest,
 )
 from hybridsim.analysis.steady.shooting import Orbit, followed_closely, shoot
 from hybridsim.analysis.steady.shortest_period import with_shortest_period
@@ -217,7 +217,7 @@ class _Search:
         )  # of an interval that can distinguish rest from slow motion
         self.scale = self.earlier = np.zeros(0)  # of the states, over the last intervals that were followed
         self.seen = np.zeros(0)  # largest scale of each state so far
-        self.largest = np.zeros(len(motion.names))  # scale of each state when it moved most, without forcing
+        self.largest = np.zeros(len(motion.names))  # scale of each state when it moved most
         self.without = 0  # consecutive intervals on which nothing returned
         self.expected = 0  # expected number of periods until the motion has settled
         can_extrapolate = system_of(motion.model).surface_of and not motion.discrete
@@ -277,7 +277,7 @@ class _Search:
             self.expected = 0
             self.periods += count
             phase = 0.0 if last is None else last.last.at
-            return forced_passings(self.motion, start, self.period, count, phase)
+            return forced_passings(self.motion, start, self.period, count, phase, self.largest)
         for _ in range(_LONGER):
             passings = self._passed(start)
             if passings.rests:
@@ -362,19 +362,10 @@ class _Search:
         steps = orbit.steps
         orbit = with_shortest_period(self.motion, orbit, self.scale, self.period is not None, self.tol)
         self.newton_steps += orbit.steps - steps
-        kind = EQUILIBRIUM if self._rests(orbit) else PERIODIC
+        rests = is_rest(self.motion, orbit.start, orbit.period, self.largest, self.periods)
+        kind = EQUILIBRIUM if rests else PERIODIC
         message = message_of(kind, orbit, self.period is not None)
         return _found(self.motion, kind, orbit, self.period is None, self.newton_steps, self.periods, message)
-
-    def _rests(self, orbit: Orbit) -> bool:
-        """Return whether all motion along an orbit is within rounding errors."""
-        solution = self.motion.run(orbit.start, orbit.period)
-        held = [segment.p[solution._system.layout.discrete_slice] for segment in solution._segments]
-        if any((values != held[0]).any() for values in held):
-            return False
-        low, high = ranges(solution)
-        sizes = np.maximum(self.motion.coupled_sizes(orbit.start), shared_sizes(solution, solution.t_start))
-        return bool((high - low <= rounding_of(sizes, self.motion.rtol)).all())
 
     def _other(self, passings: Passings) -> SteadyState:
         """Use the largest Lyapunov exponent to classify a motion that does not repeat."""

@@ -97,9 +97,10 @@ class PeriodMap:
         return tuple(part.copy() for part in self._run.state)
 
     def restore(self, snapshot: tuple[np.ndarray, ...]) -> None:
-        """Return to earlier states and modes."""
+        """Return to earlier states and modes, also after a run that ended early."""
         for part, former in zip(self._run.state, snapshot, strict=True):
             part[...] = former
+        self._run.code = DONE
 
     def put(self, x: np.ndarray) -> None:
         """Set the states (2n,) without changing the modes; the next period corrects the velocities."""

@@ -40,3 +40,28 @@ def test_the_period_is_the_time_between_two_stops(x1: float) -> None:
     assert found.multiple == 1
     assert found.period == pytest.approx(gaps.mean(), rel=1e-6)
     assert found.stops_per_period["f"] == 1
+
+
+@pytest.mark.parametrize("damping", [0.005, 0.01, 0.02])
+def test_a_stuck_contact_does_not_double_the_period(damping: float) -> None:
+    """An oscillator is forced at twice its natural frequency, so that its multiplier per period is near -1.
+
+    x'' + 2 damping x' + x = sin(2 t) has the amplitude 1/sqrt(9 + (4 damping)**2). The contact never slips from its
+    start, because its load is 0.2 and its limit 1, so that its place y is one of a family.
+    """
+    model = hs.Model(
+        "near-doubling",
+        states=[
+            hs.State("x", 0, "v"),
+            hs.State("v", 0, f"sin(2*t) - x - {2 * damping}*v"),
+            hs.State("y", 0.3, "w"),
+            hs.State("w", 0, "0.2*cos(2*t) - f"),
+        ],
+        contacts=[hs.Contact("f", "w", 1, law="stribeck", arguments={"mu_s": 1, "mu_k": 0.5, "v_s": 0.1})],
+    )
+    found = hs.steady_state(model)
+    assert (found.kind, found.multiple) == ("periodic", 1)
+    assert found.period == pytest.approx(np.pi, rel=1e-12)
+    assert found.amplitude["x"] == pytest.approx(1.0 / np.hypot(3.0, 4.0 * damping), rel=1e-8)
+    assert found.stick_fraction["f"] == 1.0
+    assert found.amplitude["y"] == 0.0

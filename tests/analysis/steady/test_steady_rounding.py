@@ -123,3 +123,33 @@ def test_a_small_motion_about_a_large_offset_is_a_motion(size: float) -> None:
     assert found.kind == "periodic"
     exact = 1e-6 * size / math.hypot(3.0, 0.2)
     assert found.amplitude["x"] == pytest.approx(exact, rel=1e-6)
+
+
+def beside_a_block_at_rest(load: float, start: float, damping: float, coupling: str = "x1") -> hs.Model:
+    """A block that its contact holds, and a mass on a spring to it that comes to rest at load/4."""
+    return hs.Model(
+        "beside-a-block-at-rest",
+        states=[
+            hs.State("x1", 0, "v1"),
+            hs.State("v1", 0, "0.2*sin(t) - 2*x1 - f"),
+            hs.State("x2", start, "v2"),
+            hs.State("v2", 0, f"{load} + {coupling} - 4*x2 - {damping}*v2"),
+        ],
+        contacts=[hs.Contact("f", "v1", 1, law="coulomb", arguments={"mu": 0.5})],
+    )
+
+
+@pytest.mark.parametrize("damping", [0.08, 2.0])
+@pytest.mark.parametrize(("load", "start"), [(0.3, 0.0), (0.3, 1.0), (0.0, 1.0), (0.0, 1e-3)])
+def test_a_mass_beside_a_held_block_comes_to_rest(load: float, start: float, damping: float) -> None:
+    """The force 0.2 sin(t) never exceeds the limit 0.5, so that the block stays at 0 and the mass ends at load/4."""
+    found = hs.steady_state(beside_a_block_at_rest(load, start, damping))
+    assert found.kind == "equilibrium"
+    assert found.solution.y[:, -1] == pytest.approx([0.0, 0.0, load / 4, 0.0], abs=1e-12)
+
+
+def test_a_motion_that_is_small_relative_to_its_start_stays_a_motion() -> None:
+    """A force of 1e-14 sin(2 t) at resonance with the damping 0.5 gives x2 the amplitude 1e-14 / (2 * 0.5)."""
+    found = hs.steady_state(beside_a_block_at_rest(0.0, 1.0, 0.5, "1e-14*sin(2*t)"))
+    assert found.kind == "periodic"
+    assert found.amplitude["x2"] == pytest.approx(1e-14, rel=1e-6)
