@@ -18,6 +18,7 @@ class Dual:
     """A dual number: a value with its derivatives (D,), or k values (k,) with derivatives (D, k)."""
 
     __slots__ = ("slope", "value")
+    __array_ufunc__ = None  # so that an array plus a dual number is a dual number, not an array of objects
 
     def __init__(self, value: Any, slope: Any) -> None:
         self.value, self.slope = value, slope
