@@ -47,7 +47,7 @@ def steady_orbits(
     first_periods: int,
     max_periods: int,
 ) -> Iterator[Orbits]:
-    """Yield groups of steady motions, without those that compiled code cannot decide.
+    """Yield groups of steady motions. Motions that need the general method are left out.
 
     parameters (N, P), in the order of the model; starts (N, n). tol, max_periods: as in `hs.steady_state`.
     first_periods: periods before the first test. The iteration ends early if `may_continue` of the ensemble returns

@@ -35,6 +35,25 @@ def test_warnings_as_json(hybridsim: Callable, tmp_path: Path) -> None:
     assert "never fires" in warning["message"] and warning["remedy"]
 
 
+UNITS = """schema = 1
+name = "units"
+[parameters]
+k = { value = 40, unit = "N/mm" }
+m = { value = 1, unit = "kg" }
+[states]
+x = { start = 1e-3, unit = "m", der = "v" }
+v = { start = 0, unit = "m/s", der = "-k*x/m" }
+"""
+
+
+def test_a_run_warns_of_units_that_disagree(hybridsim: Callable, tmp_path: Path) -> None:
+    (tmp_path / "units.toml").write_text(UNITS)
+    code, _, err = hybridsim("run", "units.toml", "--t-end", "1")
+    warned = [line for line in err.splitlines() if "warning: " in line]
+    assert code == 0
+    assert len(warned) == 1 and "units.toml:8" in warned[0]
+
+
 def test_a_sound_model_leaves_stderr_empty(hybridsim: Callable) -> None:
     code, out, err = hybridsim("check", "dfcs", "--json")
     assert (code, err) == (0, "")

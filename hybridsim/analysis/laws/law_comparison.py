@@ -127,7 +127,7 @@ class LawComparison(Readable):
         ]
 
     def plot(self) -> Any:
-        """Draw the friction loops, and the amplitudes or the first reading, side by side.
+        """Draw the friction loops of all laws, beside a bar chart of the amplitudes or of the first measure.
 
         Returns the axes; ``hybridsim.plot.save`` writes them to a file.
         """

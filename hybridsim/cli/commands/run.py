@@ -87,8 +87,9 @@ def simulated(
 
     from hybridsim.integrators.registry import UnknownOption, integrator_class, option_names
     from hybridsim.model.checks.doubtful import forces_of, jumps_of
+    from hybridsim.model.units.faults import unit_faults
 
-    cautions = [caution.sentence for caution in (*jumps_of(model), *forces_of(model))]
+    cautions = [caution.sentence for caution in (*jumps_of(model), *forces_of(model), *unit_faults(model))]
     for caution in cautions:  # before the run, which may be very slow
         complain(f"warning: {caution}")
     try:

@@ -323,7 +323,7 @@ class System(_Frame):
     # -- series ---------------------------------------------------------------------------------------------
 
     def guards_of(self, z: np.ndarray) -> np.ndarray:
-        """Return the numbers (components, widest) of the active guards in the modes `z`, padded with -1."""
+        """Return the indices of the active guards in the modes `z`: one row per component, padded with -1."""
         return np.asarray(self.guard_table[self.component_numbers, z])
 
     def guard_title(self, guard: int, z: np.ndarray) -> str:

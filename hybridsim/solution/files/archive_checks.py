@@ -100,7 +100,7 @@ def check_header(header: Header) -> None:
     taken_over = header.get("taken_over")
     if taken_over is not None:
         if not (isinstance(taken_over, list) and len(taken_over) == 2 and isinstance(taken_over[0], str)):
-            raise ValueError(f"the integrator that took over cannot be {taken_over!r}")
+            raise ValueError(f"the name of the integrator that finished the run cannot be {taken_over!r}")
         check_number("the time at which another integrator took over", taken_over[1])
     kinds = header["kinds"]
     if not (isinstance(kinds, list) and all(isinstance(kind, str) for kind in kinds)):

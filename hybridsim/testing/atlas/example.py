@@ -63,7 +63,7 @@ class Example:
 
 
 def example(result: Atlas, scene: Scene) -> Example | None:
-    """Return the example of a test case, or None if no method is correct or no difference is visible."""
+    """Return a wrong and a correct run of a test case to draw, or None if there are no such two runs."""
     by_name = {one.name: one for one in result.configurations}
     trusted = [
         by_name[name]

@@ -23,7 +23,7 @@ _NAME = re.compile(r"(.+)\[(\d{1,9})\]")
 
 
 class TableValue(NamedTuple):
-    """A value of a table: the index of the input in the model, and the index of the value in it."""
+    """One value of an input table, as the index of the input in the model and the index of the value in the table."""
 
     number: int
     value: int
