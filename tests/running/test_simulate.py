@@ -141,7 +141,9 @@ def test_a_guard_that_is_negative_from_the_start_is_named_with_its_value() -> No
     )
     sol = hs.simulate(model, (0, 1))
     assert sol.status == "cascade"
-    assert "Guard floor is -1.5 in flight before and after" in sol.message and "turn its sign" in sol.message
+    assert (
+        "Guard floor is -1.5 in flight before and after" in sol.message and "reverse its sign" in sol.message
+    )
 
 
 def test_a_run_backward_says_so() -> None:
