@@ -9,10 +9,13 @@ from typing import Any
 
 from hybridsim.analysis.compare.table import milliseconds
 from hybridsim.analysis.steady.measures import Measures
+from hybridsim.analysis.sweep.last_period import MeasuredPeriod
 from hybridsim.analysis.sweep.named_measures import units_of_readings
 from hybridsim.model import Model
 from hybridsim.presentation.readable import Readable, aligned
 from hybridsim.solution import Solution
+
+_SETTLED = 1e-3  # the residual above which a motion has visibly not settled
 
 
 @dataclass(frozen=True)
@@ -50,6 +53,13 @@ class LawRow(Measures):
         """Work of the friction force, the integral of the force times the relative velocity."""
         found = self.solution.success and self.contact in self.dissipated
         return self.dissipated[self.contact] if found else None
+
+    @property
+    def residual(self) -> float | None:
+        """The largest change of a state over the measured period, relative to half of its range; None without one."""
+        if not (self.solution.success and self.is_period):
+            return None
+        return MeasuredPeriod(self.solution, self.solution.t_end - self.solution.t_start).residual
 
     def _has(self, quantity: str) -> bool:
         return self.solution.success and quantity in self.amplitude
@@ -108,7 +118,14 @@ class LawComparison(Readable):
         lines = [f"{self.title}: laws of contact {self.contact}, t = {t0:g} to {t1:g}"]
         lines += aligned([head, *(_cells(row) for row in self.rows)], "  ")
         failed = [row for row in self.rows if not row.solution.success]
-        return "\n".join([*lines, *(f"{row.label}: {row.solution.message}" for row in failed)])
+        moving = [row for row in self.rows if row.residual is not None and row.residual > _SETTLED]
+        return "\n".join(
+            [
+                *lines,
+                *(f"{row.label}: {row.solution.message}" for row in failed),
+                *(f"{row.label}: has not settled, {_change(row)}; use a longer t_span" for row in moving),
+            ]
+        )
 
     def records(self) -> list[dict[str, Any]]:
         """Return the rows as plain Python values."""
@@ -133,6 +150,10 @@ class LawComparison(Readable):
         """
         # The plot package is a layer above this one, so it is imported only on demand.
         return import_module("hybridsim.plot").law_comparison(self)
+
+
+def _change(row: LawRow) -> str:
+    return f"a state changes by {100.0 * (row.residual or 0.0):.2g} % of its amplitude in the measured period"
 
 
 def _cells(row: LawRow) -> tuple[str, ...]:

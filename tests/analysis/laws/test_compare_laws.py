@@ -206,3 +206,16 @@ def test_a_model_with_several_contacts_needs_the_name_of_one() -> None:
     with pytest.raises(hs.UsageError, match="2 contacts") as caught:
         hs.compare_laws(hs.Model("pair", use=[hs.Use("a", block()), hs.Use("b", block())]), ["coulomb"])
     assert caught.value.remedy == "pass `contact`, one of a.f, b.f"
+
+
+def test_a_motion_that_has_not_settled_is_said() -> None:
+    """A state that grows linearly changes by twice half of its range in each period; a block at rest has settled."""
+    drift = hs.State("y", 0, "rate", nominal=1)
+    states = [hs.State("v", 0, "sin(t) - f", nominal=1), drift]
+    contact = hs.Contact("f", "v", "10", "coulomb", {"mu": 0.3})
+    for rate, residual in ((0.1, 2.0), (0.0, 0.0)):
+        found = hs.compare_laws(
+            hs.Model("drift", states, {"rate": rate}, contacts=[contact]), ["coulomb"], (0, 20)
+        )
+        assert found.rows[0].residual == pytest.approx(residual)
+        assert ("has not settled, a state changes by 2e+02 %" in str(found)) == (rate > 0.0)
