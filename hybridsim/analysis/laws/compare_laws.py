@@ -10,6 +10,7 @@ from hybridsim.analysis.compare.comparison_request import mapping, run_span
 from hybridsim.analysis.keyword_options import refuse_unknown
 from hybridsim.analysis.laws.law_comparison import LawComparison, LawRow
 from hybridsim.analysis.laws.law_readings import law_readings
+from hybridsim.analysis.sweep.run_readings import remedy_for_definition
 from hybridsim.arguments import cannot_be, chosen_model, is_row, known_name
 from hybridsim.calls import refusing
 from hybridsim.engine.system.period import forcing_period
@@ -82,6 +83,8 @@ def compare_laws(
     quantities = [*(state.name for state in model.states), *(output.name for output in model.outputs)]
     if quantity is None:
         quantity = quantities[0]
+    if remedy := remedy_for_definition(model, str(quantity)):
+        raise UsageError(f"`quantity` cannot be {quantity!r}", remedy=remedy)
     known_name(quantity, quantities, f"model {model.name} has no quantity", "quantities")
     models = models_under(model, laws, contact)
     period = forcing_period(model)

@@ -31,6 +31,7 @@ from hybridsim.analysis.sweep.run_readings import (
     OF_QUANTITY,
     OfRun,
     of_run,
+    remedy_for_definition,
 )
 from hybridsim.analysis.sweep.work.job import Incomplete, Job, Outcome, Settings, Together, Watch
 from hybridsim.analysis.sweep.work.together import PointsTogether
@@ -152,7 +153,8 @@ def named_measure(
         if (f"{stem}.1" if is_harmonic else word) not in known:
             raise UsageError(
                 f"there is no measure {word!r}",
-                remedy=nearest(word, [STEADY, FINAL, *known], kind="measures"),
+                remedy=remedy_for_definition(model, word.partition(".")[2])
+                or nearest(word, [STEADY, FINAL, *known], kind="measures"),
             )
     if AFTER in options:
         return _last_period(asked, model, dict(options))

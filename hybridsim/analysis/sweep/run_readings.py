@@ -108,9 +108,17 @@ def of_run(reading_names: Sequence[str], model: Model, options: Mapping[str, Any
             examples = [f"{FIRST_PASSAGE}.{name}>0.0" for name in quantities]
             raise UsageError(
                 f"there is no measure {word!r} of a run",
-                remedy=nearest(word, [*known, *examples], kind="measures"),
+                remedy=remedy_for_definition(model, word.partition(".")[2])
+                or nearest(word, [*known, *examples], kind="measures"),
             )
     return OfRun(tuple(reading_names), options)
+
+
+def remedy_for_definition(model: Model, name: str) -> str:
+    """Return the remedy if a definition is used as a quantity, or an empty string for another name."""
+    if is_structure(model) or name not in dict(model.definitions):
+        return ""
+    return f"{name} is a definition; declare an output with the value {name}, and use the output"
 
 
 def passage_of(word: str) -> Passage | None:

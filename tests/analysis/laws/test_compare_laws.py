@@ -219,3 +219,16 @@ def test_a_motion_that_has_not_settled_is_said() -> None:
         )
         assert found.rows[0].residual == pytest.approx(residual)
         assert ("has not settled, a state changes by 2e+02 %" in str(found)) == (rate > 0.0)
+
+
+def test_a_definition_is_not_a_measured_quantity() -> None:
+    model = block()
+    text = model.to_toml() + '\n[definitions]\npower = "f*v"\n'
+    defined = hs.Model.from_toml(text)
+    remedy = "power is a definition; declare an output with the value power"
+    with pytest.raises(hs.UsageError, match=remedy):
+        hs.compare_laws(defined, ["coulomb"], (0, 1), quantity="power")
+    with pytest.raises(hs.UsageError, match=remedy):
+        hs.compare_laws(defined, ["coulomb"], (0, 1), measure="final.power")
+    with pytest.raises(hs.UsageError, match=remedy):
+        hs.sweep(defined, {"m": [1.0, 2.0]}, "amplitude.power")
