@@ -10,6 +10,7 @@ import random
 import re
 import shutil
 import signal
+import sys
 import tempfile
 import threading
 import traceback
@@ -156,7 +157,13 @@ def observed(folder: Path, expected: object) -> Iterator[Finding]:
                 finding.faults.append(traceback.format_exc()[-3000:])
         finding.faults += [f"{w.category.__name__}: {w.message} ({w.filename}:{w.lineno})" for w in caught]
         finding.faults += seen.code
-        finding.faults += [f"wrote {place}" for place in sorted(set(seen.written)) if not expected(place)]
+        written = [place for place in sorted(set(seen.written)) if not is_bytecode(place)]
+        finding.faults += [f"wrote {place}" for place in written if not expected(place)]
+
+
+def is_bytecode(place: Path) -> bool:
+    """Whether Python itself keeps the bytecode of an installed package there, at the first import."""
+    return place.parent.name == "__pycache__" and place.is_relative_to(sys.prefix)
 
 
 @contextlib.contextmanager
