@@ -10,7 +10,6 @@ import random
 import re
 import shutil
 import signal
-import sys
 import tempfile
 import threading
 import traceback
@@ -162,8 +161,9 @@ def observed(folder: Path, expected: object) -> Iterator[Finding]:
 
 
 def is_bytecode(place: Path) -> bool:
-    """Whether Python itself keeps the bytecode of an installed package there, at the first import."""
-    return place.parent.name == "__pycache__" and place.is_relative_to(sys.prefix)
+    """Whether Python itself keeps the bytecode of a module there, whose source is in the folder above."""
+    source = place.parent.parent / f"{place.name.partition('.')[0]}.py"
+    return place.parent.name == "__pycache__" and source.is_file()
 
 
 @contextlib.contextmanager
