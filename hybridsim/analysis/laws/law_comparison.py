@@ -79,7 +79,8 @@ class LawComparison(Readable):
         The measured interval: the last period of the forcing, or the whole run of a model without a period.
     rows : tuple of LawRow
         One row per law with its ``label``, ``model``, ``solution`` and measures. ``measured`` contains the readings
-        by name. A reading is None if the run failed, or if the law lacks it.
+        by name. A reading is None if the run failed, or if the law lacks it. ``residual`` tells how closely the
+        measured period repeats.
     readings : tuple of str, optional
         Names of the readings that replace amplitude, stops and energy loss.
 
