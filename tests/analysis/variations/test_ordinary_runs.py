@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,7 +21,7 @@ def followed(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[float]]:
     found: list[float] = []
     through = Carrier._through
 
-    def counted(self, segment_events, *arguments):  # type: ignore[no-untyped-def]
+    def counted(self: Carrier, segment_events: Any, *arguments: Any) -> Any:
         found.append(float(segment_events.segment.end))
         return through(self, segment_events, *arguments)
 
