@@ -163,7 +163,10 @@ def label_ticks(panel: Axes) -> None:
         ratios = [later / earlier for earlier, later in itertools.pairwise(times)]
         if len(times) <= _MOST_TICKS and min(ratios, default=high / low) >= (high / low) ** _APART:
             break
-    panel.xaxis.set_major_locator(FixedLocator(times[:: math.ceil(len(times) / _MOST_TICKS) or 1]))
+    else:  # powers of ten, of which only every second or third has room
+        every = math.ceil(math.log10(high / low) * _APART)
+        times = [time for time in times if round(math.log10(time)) % every == 0]
+    panel.xaxis.set_major_locator(FixedLocator(times))
     panel.xaxis.set_major_formatter(EngFormatter(unit="s", sep="\N{THIN SPACE}"))
     panel.xaxis.set_minor_formatter(NullFormatter())
     panel.yaxis.set_major_locator(LogLocator(numticks=9))

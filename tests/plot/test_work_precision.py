@@ -164,3 +164,16 @@ def test_a_label_of_times_is_not_next_to_another() -> None:
     panel.set(xscale="log", xlim=(3.5e-3, 70e-3))
     label_ticks(panel)
     assert panel.get_xticks() == pytest.approx([10e-3, 30e-3])
+
+
+@pytest.mark.parametrize("limits", [(2e-4, 3.0), (1e-4, 0.9), (3e-4, 2e2), (1e-6, 1e2), (7e-3, 0.15)])
+def test_labels_of_times_have_room(limits: tuple[float, float]) -> None:
+    panel = Figure(figsize=(3, 3)).subplots()
+    panel.set_xscale("log")
+    panel.set_yscale("log")
+    panel.set_xlim(*limits)
+    label_ticks(panel)
+    places = np.log(panel.get_xticks() / limits[0]) / np.log(limits[1] / limits[0])
+    assert len(places) >= 2
+    assert np.diff(places).min() >= 0.23  # a label is about a fifth of a small panel wide
+    assert places.min() >= 0 and places.max() <= 1
