@@ -106,7 +106,7 @@ CAPABILITIES = {
 
 
 class _IntegratorType(ABCMeta):
-    """The metaclass of integrators, whose repr shows the name and the order."""
+    """The metaclass of integrators; it makes the repr of an integrator class show the name and the order."""
 
     def __repr__(cls) -> str:
         name, title, order = (getattr(cls, key, "") for key in ("name", "title", "order"))

@@ -1,4 +1,4 @@
-"""Scenes: a model, a run of the model, its known answer, and the class of difficulty."""
+"""This module defines a test case (`Scene`): a model, a run of the model, and the known answer."""
 
 from __future__ import annotations
 

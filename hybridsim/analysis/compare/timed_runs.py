@@ -58,7 +58,7 @@ class _Run:
 def timed_rows(
     entries: Sequence[Entry], repeat: int, budget: Budget, step: Callable[[str], None]
 ) -> list[tuple[Row, ...]]:
-    """Make all runs, and return the rows of each entry in the order of its series.
+    """Make all runs, and return the rows of each test case in the order of its series.
 
     First everything is run once, the loosest setting of every line before the second of any. The time of the
     next setting of a line is predicted from its last two. A run that would take more than ten times its equal

@@ -28,7 +28,7 @@ def begun_elsewhere(point: BranchPoint) -> tuple[BranchPoint, Solution]:
 
 
 def in_shared(tangent: np.ndarray, point: BranchPoint) -> np.ndarray:
-    """Set all entries of a tangent to zero except those of the period and the parameter."""
+    """Return a tangent of which only the entries of the period and the parameter are kept; the others are zero."""
     found = tangent.copy()
     found[: len(point.orbit.start.values)] = 0.0
     return found

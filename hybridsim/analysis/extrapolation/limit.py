@@ -8,7 +8,7 @@ _RCOND = 1e-10  # relative to the largest singular value; smaller ones are round
 
 
 def limit_of(before: np.ndarray, after: np.ndarray, scale: np.ndarray) -> tuple[np.ndarray, float]:
-    """Extrapolate states before and after k periods to a limit (n,); also return the change per period expected there.
+    """Extrapolate states before and after k periods to a limit (n,); also return the change per period at the limit.
 
     The limit is the combination of the states after the periods, with weights of sum one, for which the same
     combination of the changes is the smallest. It is exact for a linear map with k - 1 multipliers. Every linear

@@ -56,7 +56,7 @@ class LawRow(Measures):
 
     @property
     def residual(self) -> float | None:
-        """The largest change of a state over the measured period, relative to half of its range; None without one."""
+        """Largest change of a state over the measured period, relative to half of its range; None without a period."""
         if not (self.solution.success and self.is_period):
             return None
         return MeasuredPeriod(self.solution, self.solution.t_end - self.solution.t_start).residual

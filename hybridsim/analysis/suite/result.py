@@ -98,7 +98,7 @@ class SuiteComparison(Readable):
         }
 
     def cheapest(self, accuracies: Sequence[float] = ACCURACIES) -> dict[str, dict[float, Row | None]]:
-        """Return the cheapest row for each test case and accuracy, or None."""
+        """Return the cheapest row for each test case and accuracy; None if no row is so accurate."""
         accuracies = positives(accuracies, "accuracies") or ()
         return {
             result.scene.name: {accuracy: result.cheapest(accuracy) for accuracy in accuracies}

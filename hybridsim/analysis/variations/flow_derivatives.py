@@ -83,7 +83,7 @@ class FlowDerivatives:
         self._intervals = transitions(self._over, steps)
 
     def regular(self) -> tuple[Intervals, list[int]] | None:
-        """Return all parts of the run and the moving constants, or None if some segments are stiff."""
+        """Return all parts of the run and the constants that change, or None if some segments are stiff."""
         return None if self._stiff or self._intervals is None else (self._intervals, self._moving)
 
     def _over(self, parts: Steps) -> tuple[np.ndarray, np.ndarray]:
@@ -96,7 +96,7 @@ class FlowDerivatives:
         return found, tails
 
     def _seeds(self, number: int) -> np.ndarray:
-        """Return the derivatives of the arguments of the rates in a segment by states and moving constants."""
+        """Return the derivatives of the rates' arguments in a segment by states and by the constants that change."""
         return np.ascontiguousarray(self._vector.seeds(self._segment(number).p)[:, self._chosen])
 
     def _slopes(self, number: np.ndarray, s: np.ndarray) -> np.ndarray:

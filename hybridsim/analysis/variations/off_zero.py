@@ -1,4 +1,4 @@
-"""This module handles runs that touch a guard or surface exactly, so that a small change moves them off it.
+"""This module handles runs on which a guard or surface is exactly zero until a small change makes it nonzero.
 
 A change to the side of the run leaves the run as it is. A change to the other side is followed for the time
 tau until it returns, which is of first order. The rates differ there, so that the states change by (f_there -

@@ -60,7 +60,7 @@ def has_no_past(
 
 @dataclass(frozen=True)
 class Entry:
-    """A guard of another mode whose transition may have started the present mode."""
+    """A guard of another mode; its transition may have started the present mode."""
 
     z: np.ndarray  # modes (C,) in which the guard is evaluated
     guard: int  # its number

@@ -55,7 +55,7 @@ def as_read_by_conditions(system: System, at: Situation, jumped: bool = False) -
 
 
 def certainly_leaving(resolution: EventData) -> set[int]:
-    """Return the components that leave their modes for every choice of modes at the surfaces that are zero.
+    """Return the components that leave their modes, whichever modes are chosen at the surfaces that are zero.
 
     The sides of their guards are set accordingly. If these surfaces have too many combinations of modes, only values of
     guards without forces are used.

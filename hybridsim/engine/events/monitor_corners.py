@@ -51,7 +51,7 @@ def _corner(name: str, monitor: Monitor) -> MonitorCorner:
 
 
 def _followed(system: System) -> dict[int, tuple[int, float]]:
-    """Return the monitors whose sides follow from the mode of a component, with the component and the factor.
+    """Return the monitors whose sign follows from the mode of a component, each with this component and a factor.
 
     The monitor is the factor times the surface function of the component.
     """
@@ -132,7 +132,7 @@ class MonitorCorners:
         return found
 
     def state(self, outcome: Outcome, p: np.ndarray) -> HybridState | None:
-        """Return the state with corners for monitors, or None if the side of a monitor is not that of its modes.
+        """Return the state with corners for monitors, or None if the side of a monitor disagrees with the modes.
 
         Such a monitor is zero or not a number, or rounding hides its side at a surface.
         """

@@ -38,14 +38,14 @@ class MonitorSides:
 
     @classmethod
     def of(cls, monitors: Sequence[Monitor], before: np.ndarray) -> MonitorSides:
-        """Return the signs of the monitors without directions, because the motion before the instant is unknown."""
+        """Return the signs of the monitors without directions of crossing, because the earlier motion is unknown."""
         return cls(monitors, before, np.zeros_like(before), np.zeros(len(before), dtype=np.bool_))
 
     @classmethod
     def located(
         cls, monitors: Sequence[Monitor], before: np.ndarray, series: Any, stopping: Sequence[int]
     ) -> MonitorSides:
-        """Return the signs of the monitors, with directions from Taylor series just before the instant.
+        """Return the signs of the monitors, with directions of crossing from Taylor series just before the instant.
 
         stopping: monitors that were located to change their sides there.
         """

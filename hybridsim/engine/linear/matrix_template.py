@@ -1,4 +1,4 @@
-"""This module records how the matrices of linear modes follow from the parameters, to repeat it for other values."""
+"""This module records the computation of the matrices of linear modes, and repeats it for other parameters."""
 
 from __future__ import annotations
 

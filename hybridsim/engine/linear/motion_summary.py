@@ -71,7 +71,7 @@ def _turn(
 
 @inlined
 def _bend(lin: Any, k: int, i: int, v: Any, is_shrinking: bool) -> tuple[float, float]:
-    """Return bounds of the absolute values of a state and of its third derivative up to the next node."""
+    """Return bounds of the absolute values of a state and of its third derivative up to the next sample time."""
     size = bend = 0.0
     for j in range(lin.counts[k]):
         b = abs(lin.basis[k, i, j])
@@ -143,7 +143,7 @@ def sum_up(
     lin: Any, hold: Any, record: Any, first: int, last: int, begin: float, nodes: Any, weights: Any, scratch: Any,
     out: Any,
 ) -> bool:  # fmt: skip
-    """Add segments of a record to a `MotionSummary`; the first segment counts from local time `begin` on.
+    """Add segments of a record to a `MotionSummary`; of the first one, only the part after local time `begin`.
 
     record: ends, rows, modes, coordinates, jumps as written by `hybridsim.integrators.closed_form.segments`;
     hold: holding mode of each component. scratch: v (J,); slopes and bounds of third derivatives (3, n). Return

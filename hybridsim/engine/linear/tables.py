@@ -77,7 +77,7 @@ class LinearTables(NamedTuple):
 
 
 def no_tables() -> LinearTables:
-    """Return the empty tables of a loop whose modes are not linear."""
+    """Return empty tables, for models whose modes are not linear."""
     i, c = np.int64, np.complex128
     tables: LinearTables = packed(LinearTables(
         np.zeros(0, i), np.zeros(0), np.zeros(0), np.zeros(1, i), np.zeros(0, i), np.zeros(0), np.zeros((0, 0), i),

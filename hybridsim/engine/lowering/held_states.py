@@ -15,7 +15,7 @@ from hybridsim.expr.simplify import simplified
 _CORRECTIONS = 3
 
 Held = tuple[int, int]
-"""A constraint: its component, and 0 for s, 1 for the rate of a gap."""
+"""A constraint: its component, and 0 for the surface function or 1 for the rate of a gap."""
 
 
 class HeldStates:

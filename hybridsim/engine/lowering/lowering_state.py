@@ -190,7 +190,7 @@ class LoweringState:
 
 
 def pattern_of(e: Any, moving: Container[Any] = ()) -> tuple[Any, dict[Any, Any]]:
-    """Return an expression with numbered names, and a dict of the numbered name of each symbol.
+    """Return an expression with numbered names in place of its symbols, and a dict of the new name of each symbol.
 
     Copies of a part have the same pattern, and so share symbolic results. The numbers are in the order of the names, on
     which the order of terms depends. moving : symbols that get another kind of name.

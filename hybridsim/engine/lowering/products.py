@@ -63,7 +63,7 @@ class Products:
         return found
 
     def not_together(self, c: int, pull: Any) -> Any:
-        """Return the attraction `pull` of surface `c`, made negative while another factor of its products is held."""
+        """Return the attraction `pull` of surface `c`, or -1 while another surface in its products is held."""
         for d in sorted({e for pair in self.pairs if c in pair for e in pair} - {c}):
             pull = pull * (1 - self._holds(d)) - self._holds(d)
         return pull

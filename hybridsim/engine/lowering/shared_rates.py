@@ -39,7 +39,7 @@ def shared_rates(
 
 
 def refuse_changed_rates(lowering: LoweringState, surfaces: dict[int, Any]) -> None:
-    """Reject modes that change the rate of a state in a surface, because the holding force would be wrong."""
+    """Reject modes that change the rate of a state that a surface reads: the holding force would be wrong."""
     changing: dict[str, Any] = {}  # name of a state -> first component that changes its rate
     for component in lowering.components:
         for mode in component.modes:

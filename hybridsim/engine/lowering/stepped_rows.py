@@ -1,4 +1,4 @@
-"""This module writes the function of a generated module for time stepping with impacts.
+"""This module writes the function `stepped` of a generated module, which time stepping with impacts calls.
 
 For m surfaces in the order of the module and n states the output contains, one after the other: u_k (m,), the
 rate of a gap or a relative velocity; d(u_k)/dx (m, n); d(rates)/d(unknown_k) (m, n); and the growth of

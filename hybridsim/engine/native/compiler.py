@@ -103,7 +103,7 @@ if ENABLED:
 
     @cache
     def _plain_machine() -> Any:
-        """Return this machine with a generic cost model, or None if numba does not provide it."""
+        """Return LLVM's target machine with a generic cost model, or None if numba does not provide it."""
         features = getattr(_code_generator(), "_tm_features", None)
         if features is None or _settings()[1] is None:
             return None

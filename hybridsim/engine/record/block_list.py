@@ -60,7 +60,7 @@ class BlockList(Sequence[Item]):
                 self._forget()
 
     def _forget(self) -> None:
-        """Discard the blocks that are older than the part of the run that is stored."""
+        """Discard the blocks that end before the stored part of the run."""
         if self.window == math.inf or len(self.blocks) == 1:
             return
         now, window, spare = self.blocks[-1].until, self.window or 0.0, len(self) - self._least

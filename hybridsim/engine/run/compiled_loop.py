@@ -112,7 +112,7 @@ class CompiledLoop:
         self.corners, self.system, self.kernels.recorded = corners, corners.plain, corners.plain
 
     def look_ahead(self, timetable: Timetable, end: Instant) -> None:
-        """Prepare the known times up to the end of the run, which later calls process."""
+        """Prepare the known times up to the end of the run; later calls process these times."""
         self.times_ahead = TimesAhead(self.kernels.system, timetable, end)
 
     def fresh_copy(self) -> CompiledLoop:

@@ -76,7 +76,7 @@ class Headway:
 
     @property
     def place(self) -> tuple[float, ...]:
-        """Return the state as numbers, for a checkpoint."""
+        """Return the measurements so far as numbers, for a checkpoint."""
         counts = self._steps, self._events, self._in_python, self._last, self._slow
         return *self._since, *self._half, *counts, self._cost, self._twice, self._led, self._fading
 

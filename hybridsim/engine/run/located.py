@@ -88,7 +88,7 @@ class Located:
     waiting: frozenset[int] = frozenset()
 
     def scope(self, system: System) -> set[int]:
-        """Return the components that take part in the event; waiting components are resolved after the schedules."""
+        """Return the components that take part in the event; components that wait for a schedule come later."""
         return set(range(len(system.automata))) - self.waiting
 
     def is_event(self, system: System) -> bool:
@@ -189,7 +189,7 @@ def as_stepped(system: System, at: Situation, arrival: Arrival, segment: Segment
 def _as_due(
     system: System, origin: Instant, at: Situation, series: Any, arrival: Arrival, known_at: float
 ) -> tuple[Situation, Any]:
-    """Return the state at a scheduled time; widen the error bounds if more functions are zero within the wider ones."""
+    """Return the state at a scheduled time, with wider error bounds if these show more functions at zero."""
     slopes = np.abs(system.flow(at.s, at.x, at.p, at.z)) if system.n else 0.0
     wide = replace(at, x_error=at.x_error + known_at * slopes, s_error=at.s_error + known_at)
     known = system.series(wide.s, wide.x, wide.p, wide.z, wide.x_error, wide.s_error)

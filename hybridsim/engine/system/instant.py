@@ -59,7 +59,7 @@ def two_product(a: float, b: float) -> tuple[float, float]:
 
 
 def multiples(start: float, k: np.ndarray, period: float) -> np.ndarray:
-    """Return the scheduled times (m, 2) number k (m,); each equals the result of `multiple` bit for bit."""
+    """Return the scheduled times (m, 2) with the numbers k (m,), each bit for bit equal to the result of `multiple`."""
     high, error = _plain(two_product)(k.astype(float), period)
     total, rest = _plain(two_sum)(start, high)
     return np.stack(_plain(two_sum)(total, rest + error), axis=1)

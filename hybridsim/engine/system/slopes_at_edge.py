@@ -17,7 +17,7 @@ _ROUNDING = 1e-9  # of a derivative: a smaller difference is rounding
 _NOISE = 1e-13  # of the largest derivative: a smaller difference is rounding
 
 Displaced = Callable[[float, np.ndarray, np.ndarray], np.ndarray]
-"""The type of derivatives (W, D) at a point displaced in time, states and run-time vector."""
+"""The type of functions that return derivatives (W, D) at a point displaced in time, states and run-time vector."""
 
 
 def slopes_at_edge(

@@ -341,7 +341,7 @@ class System(_Frame):
         return mask
 
     def mode_rows(self, z: np.ndarray) -> list[tuple[int, ...]]:
-        """Return the instructions in the modes `z`."""
+        """Return the instruction tape of the modes `z`."""
         rows: list[tuple[int, ...]] = []
         for component, branches in self.code.data["tape"]["parts"]:
             rows += branches[0 if component < 0 else z[component]]

@@ -41,7 +41,7 @@ class Rodas5P(Integrator):
 
     @property
     def rounding(self) -> float:
-        """Return three times the root of the sum of squares of the rounding errors of the stages."""
+        """Return the rounding error of a step: three times the root sum of squares over its stages."""
         return 2500.0
 
     def start(

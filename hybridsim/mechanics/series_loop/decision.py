@@ -40,7 +40,7 @@ def joint_choice(arrays: Any, laws: Any, state: Any, scratch: Any, j: int, tau: 
 
 
 def choose_jointly(arrays: Any, laws: Any, state: Any, scratch: Any) -> int:
-    """Run `joint_choice` with the arguments in the state."""
+    """Run `joint_choice` as a kernel that is called by its address and finds its arguments in the state."""
     j, fired, tau = state.whole[NODE], state.whole[FIRED], state.real[AT]
     first, last = arrays.node_con[j], arrays.node_con[j + 1]
     _stop_at(arrays, state, j, tau)

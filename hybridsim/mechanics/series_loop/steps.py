@@ -301,7 +301,7 @@ def _law_holds(
 
 
 def step_length_kernel(arrays: Any, laws: Any, state: Any, scratch: Any) -> int:
-    """Call `step_length` with the arguments stored in the state."""
+    """Run `step_length` as a kernel that is called by its address and finds its arguments in the state."""
     nd, nc, top = state.whole[codes.DOFS], state.whole[codes.CONS], state.whole[codes.ORDER]
     tau, longest, rtol = state.real[codes.AT], state.real[codes.LONGEST], state.real[codes.RTOL]
     h = reach(arrays, state, scratch, nd, nc, top, rtol, longest)

@@ -184,7 +184,7 @@ class LawTable(Declared):
         return cls(name, at, values, over, "linear")  # type: ignore[arg-type]  # they are converted
 
     def value(self, argument: float, across: float | None = None) -> float:
-        """Return the value of the function at one argument, or at both arguments of a table of two."""
+        """Return the value of the function at its argument, or at both arguments if the table has two."""
         for entry in self.expressions():
             raise UsageError(
                 f"table {self.name} has the value {entry.text}, which depends on parameters",

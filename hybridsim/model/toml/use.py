@@ -123,7 +123,7 @@ def _laws(
 def _contacts(
     table: Table, part: Model, values: Mapping[str, Any], keys: tuple[str, ...]
 ) -> Iterator[tuple[tuple[str, ...], Any]]:
-    """Yield the keys of contacts with the entries of `laws` for them; an unknown contact is reported."""
+    """Yield the keys of each contact in `laws` with its entry; an unknown contact is reported."""
     contacts = [contact.name for contact in part.contacts]
     for key, value in values.items():
         path = (*keys, key)

@@ -1,4 +1,4 @@
-"""Scenes of events that accumulate in finite time."""
+"""This module contains test cases of events that accumulate in finite time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Scenes of events at one instant: coinciding guards, flat guards, guards that a reset makes zero, and ends of runs."""
+"""This module contains test cases of guards that coincide, are flat, or become zero by a reset."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Scenes of conditions that jump: combined comparisons of time and states in rates, contacts and guards."""
+"""This module contains test cases of conditions on time and states that make rates, contacts and guards jump."""
 
 from __future__ import annotations
 

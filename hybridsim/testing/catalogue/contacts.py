@@ -1,4 +1,4 @@
-"""Scenes of stick with other laws, on a belt, and with several contacts at once."""
+"""This module contains test cases of stick: with other laws, on a belt, and with several contacts at once."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Scenes of flows with corners: no event is reported, and the accuracy is as high as in a smooth flow."""
+"""This module contains test cases of flows with corners, which must be as accurate as smooth flows."""
 
 from __future__ import annotations
 

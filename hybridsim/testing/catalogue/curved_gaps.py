@@ -1,4 +1,4 @@
-"""Scenes of impacts with curved gaps: a round wall, two discs."""
+"""This module contains test cases of impacts with curved gaps: a round wall, two discs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Scenes of guards with a direction, and of elements that are declared in one line."""
+"""This module contains test cases of guards with a direction, and of elements that are declared in one line."""
 
 from __future__ import annotations
 

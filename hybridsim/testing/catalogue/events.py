@@ -1,4 +1,4 @@
-"""Scenes of events: crossings, double roots, roots at a start or at the end of a step, output grids."""
+"""This module contains test cases of event location: crossings, double roots, roots at the ends of steps."""
 
 from __future__ import annotations
 

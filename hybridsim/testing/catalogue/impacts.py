@@ -1,4 +1,4 @@
-"""Scenes of impacts with restitution: infinitely many bounces, double impacts, a vibrating table, a row of balls."""
+"""This module contains test cases of impacts with restitution: bounces without end, double impacts, rows of balls."""
 
 from __future__ import annotations
 

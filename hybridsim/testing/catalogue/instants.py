@@ -1,4 +1,4 @@
-"""Scenes of several changes at one instant: additive resets, zeros at clock ticks, touches, copied values."""
+"""This module contains test cases of several changes at one instant, such as resets and zeros at clock ticks."""
 
 from __future__ import annotations
 

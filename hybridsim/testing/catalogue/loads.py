@@ -1,4 +1,4 @@
-"""Scenes of loads: a load that touches zero, a load from a reaction, contacts in series."""
+"""This module contains test cases of normal loads: a load that touches zero, a reaction, contacts in series."""
 
 from __future__ import annotations
 

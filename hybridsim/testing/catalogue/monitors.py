@@ -1,4 +1,4 @@
-"""Scenes with monitors at stops and bounces, with all monitor actions, and with simultaneous guards."""
+"""This module contains test cases of monitors: at stops and bounces, with all actions, and with other guards."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Scenes of the dry friction oscillator, compared with its closed form over the whole run."""
+"""This module contains test cases of the dry friction oscillator, with its closed form over the whole run."""
 
 from __future__ import annotations
 

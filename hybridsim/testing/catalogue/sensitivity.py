@@ -1,4 +1,4 @@
-"""Scenes that amplify errors, such as chaotic motion and grazing."""
+"""This module contains test cases that amplify errors, such as chaotic motion and grazing."""
 
 from __future__ import annotations
 

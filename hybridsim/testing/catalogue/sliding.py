@@ -1,4 +1,4 @@
-"""Scenes of switching surfaces: crossing, sliding, release, several surfaces, and nonunique motions."""
+"""This module contains test cases of switching surfaces: crossing, sliding, release, and nonunique motions."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Scenes of stability: steps longer than a fast contact or filter allows, and thousands of periods."""
+"""This module contains test cases of stability: steps too long for a fast contact, and thousands of periods."""
 
 from __future__ import annotations
 

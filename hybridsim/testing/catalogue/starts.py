@@ -1,4 +1,4 @@
-"""Scenes of starts and jumps at which corners, guards and contacts have to choose their sides."""
+"""This module contains test cases of starts and jumps, at which corners, guards and contacts choose their sides."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Scenes of stiffness: regularized friction, and a smooth control."""
+"""This module contains test cases of stiffness, such as regularized friction, and smooth ones for comparison."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Scenes of a stop in the direction of friction: infinitely many bounces, rest at the stop, and release."""
+"""This module contains test cases of a stop in the direction of friction: bounces without end, rest, and release."""
 
 from __future__ import annotations
 

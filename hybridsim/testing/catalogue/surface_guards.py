@@ -1,4 +1,4 @@
-"""Scenes of guards that reach zero together with the velocity of a contact or with a gap."""
+"""This module contains test cases of guards that reach zero together with the velocity of a contact or a gap."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Scenes near the stick limit: forces just above the limit, decreasing loads, small speeds, many stops."""
+"""This module contains test cases near the stick limit: small excess forces, decreasing loads, many stops."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Scenes of events at known times, and of runs backward in time."""
+"""This module contains test cases of events at known times, and of runs backward in time."""
 
 from __future__ import annotations
 

@@ -181,7 +181,7 @@ def over_parts(
 def speeds_at(
     tapes: Any, inputs: Any, run: Any, work: Any, numbers: Any, s: Any, x: Any, speeds: Any
 ) -> None:
-    """Write a bound of the eigenvalues of the Jacobian of the rates at ascending points, or zero if it does not exist.
+    """Write a bound of the eigenvalues of the rates' Jacobian at ascending points; zero where no Jacobian exists.
 
     It is the square root of a norm of the square of the matrix.
     """

@@ -1,4 +1,4 @@
-"""This module finds located guards that do not fire, because the modes of surfaces keep them non-negative.
+"""This module finds guards that reached zero but do not fire, because the modes of surfaces keep them non-negative.
 
 A guard on the velocity of a contact reaches zero together with it, according to the motion before. If the contact then
 sticks, the guard stays at zero. If an impact reverses the motion, the guard only touches zero.
@@ -16,7 +16,7 @@ from hybridsim.engine.events.jumps.impact import strike
 
 
 def cancelled_by_surfaces(resolution: ClusterChoice, automata: set[int], surfaces: set[int]) -> set[int]:
-    """Return the automata whose located guards do not fire after the modes at surfaces are chosen."""
+    """Return the automata whose guards reached zero but do not fire, once the modes at surfaces are chosen."""
     ahead = copy(resolution)
     ahead.at = replace(resolution.at, z=resolution.at.z.copy())
     ahead.fired, ahead.on_surface = resolution.fired.copy(), resolution.on_surface.copy()

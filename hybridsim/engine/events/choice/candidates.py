@@ -21,7 +21,7 @@ _rank_candidates, _joint_choice, _is_settled = map(Precompiled, (rank_candidates
 
 
 class JudgedCandidates(NamedTuple):
-    """The candidates of a joint choice, the verdicts on the judged candidates, and the chosen candidate."""
+    """The candidates for the modes of several components, the verdicts so far, and the chosen candidate."""
 
     candidates: np.ndarray  # modes (k, members)
     verdicts: np.ndarray  # (k,)
@@ -62,7 +62,7 @@ def judged_candidates(
 def completed(
     resolution: EventVerdicts, members: list[int], found: JudgedCandidates, cluster: tuple[int, ...]
 ) -> np.ndarray:
-    """Judge the remaining combinations of modes, and return the verdicts on all of them."""
+    """Judge the combinations of modes that have no verdict yet, and return the verdicts on all combinations."""
     for number in np.flatnonzero(found.verdicts == _UNJUDGED):
         z = resolution.with_modes(members, found.candidates[number])
         found.verdicts[number] = resolution.verdict(z, cluster)
@@ -72,6 +72,6 @@ def completed(
 def all_verdicts(
     resolution: EventVerdicts, members: list[int], candidates: np.ndarray, cluster: tuple[int, ...]
 ) -> np.ndarray:
-    """Return the verdicts on all joint candidates."""
+    """Return the verdicts on all candidates for the modes of several components."""
     verdicts = np.full(len(candidates), _UNJUDGED, dtype=np.int64)
     return completed(resolution, members, JudgedCandidates(candidates, verdicts, 0), cluster)

@@ -1,4 +1,4 @@
-"""Choose the modes of clusters at an event in Python, and report if there is no unique motion."""
+"""Choose the modes of coupled components at an event, in Python; report if the motion is not unique."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from hybridsim.engine.system.system import System
 
 
 def with_tied(system: System, members: list[int]) -> list[int]:
-    """Return the given components, and the contacts whose velocity is proportional to the rate of one of their gaps."""
+    """Return the given components, and the contacts whose velocity is proportional to the rate of a given gap."""
     tied = {along for gap, along, is_one in system.stop_couplings if is_one and gap in members}
     return sorted(tied.union(members))
 
@@ -54,7 +54,7 @@ class ClusterChoice(EventVerdicts):
     """The joint choices of modes at one event, made in Python."""
 
     def choose_jointly(self, open_: set[int]) -> tuple[str, str] | None:
-        """Choose the modes of each cluster that contains a component whose mode is open."""
+        """Choose the modes of each cluster of components in which at least one mode is undecided."""
         for cluster in self.system.clusters:
             if open_ & set(cluster):
                 failure = self._choose_cluster(cluster, open_)

@@ -38,7 +38,7 @@ class EventVerdicts(EventData):
         )  # fmt: skip
 
     def judged(self, z: np.ndarray) -> JudgedEvent:
-        """Return the data that a verdict on the modes `z` reads; the series run in the direction of time of the run."""
+        """Return the data that a verdict on the modes `z` reads; the Taylor series follow the direction of the run."""
         series = self.series_of(z)
         judged = np.array([series.guards, series.guard_bounds])
         if not self.forward:
@@ -52,7 +52,7 @@ class EventVerdicts(EventData):
         return LEAVES if found == UNDECIDED and not self._can_hold(components, z) else found
 
     def _can_hold(self, members: list[int], z: np.ndarray) -> bool:
-        """Return whether all surfaces held in the modes `z` can be held together by forces."""
+        """Return whether forces can hold all surfaces of the holding modes in `z` at zero at the same time."""
         automata = self.system.automata
         if sum(automata[c].has_surface and z[c] == automata[c].hold for c in members) < 2:
             return True
@@ -60,7 +60,7 @@ class EventVerdicts(EventData):
         return bool(np.isfinite(self.series_of(z).guards[numbers[numbers >= 0], 0]).all())
 
     def verdict_on_guards(self, z: np.ndarray, components: list[int], continuous: bool) -> int:
-        """Return the verdict on the guards only; whether surfaces can be held together is not checked."""
+        """Return the verdict on the guards, without checking that forces can hold all surfaces at the same time."""
         members = np.array(components, dtype=np.int64)
         return int(_verdict(self.automata, None, 0, self.judged(z), z, members, continuous, True, 0))
 

@@ -26,7 +26,7 @@ NO_CAUSE = -1  # rank of a candidate in which a component below its limits leave
 
 @inlined
 def is_below_limit(automata: Any, event: Any, c: int) -> bool:
-    """Return whether contact `c` is certainly below its limits, according to the Taylor series of its holding mode."""
+    """Return whether the force of contact `c` is certainly below its limits, by the series of its holding mode."""
     for j in range(automata.guards_of.shape[2]):
         g = automata.guards_of[c, automata.hold[c], j]
         if g >= 0 and not event.judged[0, g, 0] > event.judged[1, g, 0]:
@@ -38,7 +38,7 @@ def is_below_limit(automata: Any, event: Any, c: int) -> bool:
 def rank_candidates(
     modes: Any, total: int, count: int, current: Any, holds: Any, keeps: Any, ranks: Any
 ) -> None:
-    """Write the rank of each combination of modes, or NO_CAUSE if it releases a contact below its limit.
+    """Write the rank of each combination of modes, or NO_CAUSE for one that releases a contact below its limit force.
 
     modes (total, count): the candidates, one row each. current, holds (count,): the current and the holding modes.
     keeps (count,): contacts below their limits, which have no cause to leave their holding modes. Static friction above

@@ -52,7 +52,7 @@ def is_one_motion(resolution: EventVerdicts, members: list[int], candidates: np.
 
 
 def on_its_side(resolution: EventVerdicts, members: list[int], candidates: np.ndarray) -> int:
-    """Return the number of the first candidate whose motion has the signs that its modes require, or 0 if none has.
+    """Return the number of the first candidate whose surfaces have the signs that its modes require, or 0.
 
     A body at rest may slip either way within rounding. Its holding mode leaves it a speed, or a rate, of some sign.
     """
@@ -98,7 +98,7 @@ def keeps_nothing(resolution: EventVerdicts, members: list[int], z: np.ndarray) 
 
 
 def _pull(resolution: EventVerdicts, sliding: list[int], z: np.ndarray) -> np.ndarray:
-    """Return a matrix (k, k): how much the rate of surface i falls if surface j changes from below to above."""
+    """Return a matrix (k, k): the fall of the rate of surface i if the mode of surface j goes from below to above."""
     automata, order = resolution.system.automata, resolution.system.surface_of
     rows = [order.index(c) for c in sliding]
     found = np.empty((len(sliding), len(sliding)))

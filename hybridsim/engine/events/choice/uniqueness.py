@@ -1,4 +1,4 @@
-"""Discard combinations in which contacts below their limits slip, and check that the motion is unique.
+"""Discard combinations of modes in which a contact slips below its limit force; check that the motion is unique.
 
 Static friction above kinetic friction makes several combinations admissible: if one contact releases, the force on
 another jumps. A contact below its limit has no cause to release unless the other contacts leave no alternative, as in
@@ -24,7 +24,7 @@ _is_below_limit = Precompiled(is_below_limit)
 
 
 def below_limits(resolution: EventVerdicts, members: list[int]) -> np.ndarray:
-    """Return a mask of the contacts that are certainly below their limits; a single component is not tested."""
+    """Return a mask of the contacts whose forces are certainly below their limits; single ones are not tested."""
     automata, at = resolution.system.automata, resolution.at
     modes, keeps = np.maximum(at.z, 0), np.zeros(len(members), dtype=np.bool_)
     holding = [

@@ -21,7 +21,7 @@ from hybridsim.engine.series.bounded import UNIT
 
 @inlined
 def _zeros_of(automata: Any, c: int, g: int, zeros: int) -> int:
-    """Return the number of leading zero coefficients of a guard: `zeros` if it is the surface of `c`, otherwise 0."""
+    """Return the number of leading zero coefficients of a guard: `zeros` for the surface of component `c`, else 0."""
     return zeros if automata.place[g] == 0 and automata.owner[g] == c else 0
 
 

@@ -79,7 +79,7 @@ def _restitution(functions: Any, at: Any, q: int, speed: float, work: Any) -> fl
 
 @inlined
 def _impulse(automata: Any, functions: Any, at: Any, c: int, rate: float, rebound: float, work: Any) -> float:
-    """Return the impulse for a rebound, or NaN if the impulse loads friction or there is no single solution.
+    """Return the impulse of a rebound, or NaN if it changes a friction limit or the solution is not unique.
 
     `out` of the work space receives the output of `hybridsim.engine.lowering.impulse_rows.impulses`.
     """

@@ -81,7 +81,7 @@ def take_choice(
     p: Any,
     work: Any,
 ) -> bool:
-    """Take the declared transition of a guard and apply its reset; return False if surfaces may move."""
+    """Take a guard's declared transition and apply its reset; return False if the general code has to do this."""
     for d in range(z.shape[0]):
         short_loop()
         if automata.hold[d] >= 0 and not automata.is_corner[automata.owner[fired]]:

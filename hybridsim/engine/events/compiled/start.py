@@ -77,7 +77,7 @@ def plain_start(
 
 @inline_always
 def _take_sides(automata: Any, inputs: Any, surfaces: Any, pin_at: int, state: Any, work: Any) -> bool:
-    """Set each mode by the side of the component's surface; return False if a value is NaN."""
+    """Set the mode of each component by the sign of its surface function; return False if a value is NaN."""
     constant, rows, derivatives, registers, owners = surfaces
     V, E, z, p = work.V, work.E, state.z, state.p
     p[pin_at] = 0.0  # the states as they are, not projected by a holding mode

@@ -22,7 +22,7 @@ Failure = tuple[str, str]
 
 
 def strike(resolution: EventData, open_: set[int]) -> Failure | None:
-    """Compute the collision of contacts whose gaps close; only contacts at rest afterwards remain in `open_`.
+    """Compute the impacts at closing gaps; of these contacts, only those at rest afterwards remain in `open_`.
 
     A contact at zero gap with a velocity of separation is open from now on.
     """
@@ -50,7 +50,7 @@ def strike(resolution: EventData, open_: set[int]) -> Failure | None:
 
 
 def _surfaces(resolution: EventData) -> tuple[np.ndarray, np.ndarray]:
-    """Return the Taylor coefficients of the surfaces, with bounds, at states without projection."""
+    """Return the Taylor coefficients of the surfaces, with bounds, at states that are not projected onto surfaces."""
     at, system = resolution.at, resolution.system
     free = at.p.copy()
     free[system.layout.pin_at] = 0.0

@@ -79,7 +79,7 @@ def may_end(
     work: Any,
     last: Any,
 ) -> tuple[bool, int]:
-    """Return whether the intervals of a component still shrink or may have reached their limit, and their number.
+    """Return whether a component's intervals still shrink or may have reached their limit, and how many there are.
 
     In a series an interval is shorter than the one a turn before it, or negligible, many times in a row. The series has
     not ended while the next interval, predicted by the last factor, exceeds the threshold.

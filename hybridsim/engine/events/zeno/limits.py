@@ -169,7 +169,7 @@ def holds_several(system: System, outcome: Outcome) -> bool:
 def _within_reach(
     system: System, outcome: Outcome, p: np.ndarray, left: float, changed: tuple[int, ...]
 ) -> list[int]:
-    """Return the components whose surfaces may be zero within a time, and the friction contacts that these load."""
+    """Return the components whose surfaces may be zero within a time, and friction contacts on which these act."""
     series = system.series(0.0, outcome.x, p, outcome.z, outcome.x_error, 0.0)
     found: list[int] = []
     rubbing: list[int] = []
