@@ -88,10 +88,10 @@ def text(value: Any, what: str) -> str:
     return value
 
 
-def known_name(value: Any, known: Sequence[str], what: str, kind: str) -> str:
-    """Return a name if it is known, or raise an error that begins with the text `what`."""
+def known_name(value: Any, known: Sequence[str], message: str, kind: str) -> str:
+    """Return a name if it is known, or raise an error that begins with the text `message`."""
     if not isinstance(value, str) or value not in known:
-        raise UsageError(f"{what} {value!r}", remedy=nearest(str(value), known, kind=kind))
+        raise UsageError(f"{message} {value!r}", remedy=nearest(str(value), known, kind=kind))
     return value
 
 
@@ -192,30 +192,30 @@ def time_span(t_span: Any) -> tuple[float, float]:
     return two_numbers(t_span, "t_span", remedy, "; a monitor can end a run early")
 
 
-def two_numbers(value: Any, what: str, remedy: str, but: str = "") -> tuple[float, float]:
+def two_numbers(value: Any, argument: str, remedy: str, but: str = "") -> tuple[float, float]:
     """Return two finite numbers; `but` is added to the remedy for infinite numbers."""
     if not is_row(value):
-        raise cannot_be(what, value, remedy)
-    ends = [number(t, f"a value of `{what}`", remedy) for t in value]
+        raise cannot_be(argument, value, remedy)
+    ends = [number(t, f"a value of `{argument}`", remedy) for t in value]
     if len(ends) != 2:
         shown = repr(value) if len(ends) < 5 else f"{len(ends)} numbers from {ends[0]!r} to {ends[-1]!r}"
-        raise UsageError(f"`{what}` cannot be {shown}", remedy=remedy)
+        raise UsageError(f"`{argument}` cannot be {shown}", remedy=remedy)
     if not all(map(math.isfinite, ends)):
-        raise cannot_be(what, value, f"use two finite numbers{but}")
+        raise cannot_be(argument, value, f"use two finite numbers{but}")
     return ends[0], ends[1]
 
 
-def start_values(model: Model, x0: Any, what: str = "x0") -> tuple[dict[str, float], Model]:
-    """Return initial values by name, and the model with the given discrete states; `what` names the argument."""
+def start_values(model: Model, x0: Any, keyword: str = "x0") -> tuple[dict[str, float], Model]:
+    """Return initial values by name, and the model with the given discrete states; `keyword` names `x0`."""
     if x0 is None:
         return {}, model
     names = [s.name for s in model.states]
     if not isinstance(x0, Mapping):
         each = f"use one number for each of {', '.join(names)}, or a dict of names and numbers"
-        values = numbers(x0, what, each)
+        values = numbers(x0, keyword, each)
         if len(values) != len(names):
             raise UsageError(
-                f"`{what}` has {len(values)} values, but model '{model.name}' has {len(names)} states "
+                f"`{keyword}` has {len(values)} values, but model '{model.name}' has {len(names)} states "
                 f"({', '.join(names)})",
                 remedy="use one value for each state, or a dict of names and values",
             )
@@ -225,14 +225,13 @@ def start_values(model: Model, x0: Any, what: str = "x0") -> tuple[dict[str, flo
     for name, value in x0.items():
         if name not in names + discrete:
             raise UsageError(
-                f"`{what}` contains {name!r}, which is not a state of model '{model.name}'",
+                f"`{keyword}` contains {name!r}, which is not a state of model '{model.name}'",
                 remedy=remedy_for_state(model, str(name)),
             )
-        found[name] = number(
-            value, f"`{what}` of {name}", f"use a number; for an expression use model.with_start({name}=...)"
-        )
+        remedy = f"use a number; for an expression use model.with_start({name}=...)"
+        found[name] = number(value, f"`{keyword}` of {name}", remedy)
         if not math.isfinite(found[name]):
-            raise UsageError(f"`{what}` of {name} cannot be {value!r}", remedy="use a finite number")
+            raise UsageError(f"`{keyword}` of {name} cannot be {value!r}", remedy="use a finite number")
     changed = {n: v for n, v in found.items() if n in discrete}
     return {n: v for n, v in found.items() if n in names}, model.with_start(**changed) if changed else model
 

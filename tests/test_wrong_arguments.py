@@ -47,7 +47,7 @@ _ALSO = {
     "uncertain": ("range",),
     "rtols": ("rtol",),
     "values": ("to sweep over", "value of"),
-    "frequencies": ("value of", "values of", "has no values"),
+    "frequencies": ("value of", "values of"),
     "name_or_path": ("model", "path"),
 }
 # Made by calls and not by users; errors.

@@ -32,12 +32,12 @@ def refuse_unknown(calls: Iterable[Callable[..., Any]], options: Mapping[str, An
     name = integrator_name(options.get("integrator", "auto"))
     classes = [integrator_class(one) for one in (_OF_AUTO if name == "auto" else (name,))]
     known = own | {option for one in classes for option in option_names(one)}
-    whose = (
+    called = (
         "simulate or of the integrators that 'auto' selects from"
         if name == "auto"
         else f"simulate or of {name}"
     )
-    _refuse(options, known, whose)
+    _refuse(options, known, called)
 
 
 def refuse_what_it_does_not_take(function: Callable[..., Any], options: Mapping[str, Any]) -> None:
@@ -60,9 +60,9 @@ _names_of_ours = cache(
 )  # a signature takes longer to read than a short run; users' functions are not kept
 
 
-def _refuse(options: Mapping[str, Any], known: set[str], whose: str) -> None:
+def _refuse(options: Mapping[str, Any], known: set[str], called: str) -> None:
     for option in options:
         if option not in known:
             raise UsageError(
-                f"{option!r} is not an option of {whose}", remedy=nearest(option, known, kind="options")
+                f"{option!r} is not an option of {called}", remedy=nearest(option, known, kind="options")
             )

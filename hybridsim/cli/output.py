@@ -104,9 +104,9 @@ def require_writable(path: Path, option: str, suffixes: Sequence[str] = ()) -> N
 
 def require_apart(path: Path, option: str, others: Mapping[str, Path]) -> None:
     """Raise an error if an output file is also an input file, or the file of another option."""
-    for what, other in others.items():
+    for other_use, other in others.items():
         if path.resolve() == other.resolve() or (path.exists() and other.exists() and path.samefile(other)):
-            raise UsageError(f"{option}: {path} is also {what}", remedy="use another file name")
+            raise UsageError(f"{option}: {path} is also {other_use}", remedy="use another file name")
 
 
 def _takes_files(folder: Path) -> bool:
@@ -120,15 +120,15 @@ def _takes_files(folder: Path) -> bool:
 
 def require_folder(path: Path, option: str) -> None:
     """Raise an error if a folder for results neither exists nor can be created."""
-    nearest = path
+    existing = path
     try:
-        while not nearest.exists() and nearest != nearest.parent:
-            nearest = nearest.parent
+        while not existing.exists() and existing != existing.parent:
+            existing = existing.parent
     except OSError as fault:  # an invalid folder name
         raise UsageError(f"{option}: {path}: {fault.strerror}", remedy="use another folder") from None
-    if not nearest.is_dir():
-        raise UsageError(f"{option}: {nearest} is a file", remedy="use the name of a folder")
-    if not _takes_files(nearest):
+    if not existing.is_dir():
+        raise UsageError(f"{option}: {existing} is a file, not a folder", remedy="use the name of a folder")
+    if not _takes_files(existing):
         raise UsageError(
-            f"{option}: no permission to write to {nearest}", remedy="use a folder that you can write to"
+            f"{option}: no permission to write to {existing}", remedy="use a folder that you can write to"
         )

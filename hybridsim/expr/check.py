@@ -128,10 +128,10 @@ class _Checker:
                 return self.conditional(test, body, orelse)
             case ast.Call():
                 return self.call(node), False
-        what = _KINDS.get(type(node), "this operation")
+        operation = _KINDS.get(type(node), "this operation")
         raise self.fail(
             node,
-            f"{what} is not allowed in an expression",
+            f"{operation} is not allowed in an expression",
             "use numbers, names, + - * / **, comparisons, and/or/not, 'a if c else b' and functions",
         )
 
@@ -154,7 +154,9 @@ class _Checker:
         if name in CONSTANTS:
             return True
         if name in FUNCTIONS:
-            raise self.fail(node, f"'{name}' is a function", f"call the function: {name}(...)")
+            raise self.fail(
+                node, f"the function '{name}' has no arguments here", f"write {name}(...) with arguments"
+            )
         if "." in name and not RESERVED.isdisjoint(name.split(".")):
             word = next(word for word in name.split(".") if word in RESERVED)
             raise self.fail(node, f"the name '{name}' contains the reserved word '{word}'", _DOTS)
@@ -191,7 +193,7 @@ class _Checker:
                 fault.node, f"the constant has no finite real value: {fault.reason}", "correct the numbers"
             ) from None
         if vanished:
-            raise self.fail(node, "the power is too small for a double", "write 0, or change the scale")
+            raise self.fail(node, "the power is too small for a double", "write 0, or use other units")
 
     def conditional(self, test: ast.expr, body: ast.expr, orelse: ast.expr) -> tuple[bool, bool]:
         constant = self.truth(test)
@@ -199,7 +201,7 @@ class _Checker:
         if boolean != other:
             raise self.fail(
                 orelse,
-                "one branch is a number and the other is a condition",
+                "one branch of 'a if c else b' is a number, and the other branch is a condition",
                 "write numbers in both branches",
             )
         return constant and first and second, boolean
@@ -213,14 +215,20 @@ class _Checker:
             hint = _INSTEAD.get(name) or nearest(name, FUNCTIONS, kind="functions")
             raise self.fail(node, f"unknown function '{name}'", hint)
         if node.keywords:
-            raise self.fail(node, f"{name}() has no keyword arguments", f"pass {function.arity} by position")
+            raise self.fail(
+                node, f"{name}() has no keyword arguments", f"pass {function.arity}, without names"
+            )
         for argument in node.args:
             if isinstance(argument, ast.Starred):
-                raise self.fail(argument, "an unpacking with * is not allowed", "list the arguments")
+                raise self.fail(
+                    argument, "an unpacking with * is not allowed", "write the arguments one by one"
+                )
         count = len(node.args)
         if not function.least <= count <= function.most:
             raise self.fail(
-                node, f"{name}() needs {function.arity}, but was called with {count}", "correct the arguments"
+                node,
+                f"{name}() needs {function.arity}, but was called with {count}",
+                "correct the number of arguments",
             )
         return self.every(self.number, node.args)
 
@@ -232,9 +240,9 @@ def check_size(tree: ast.expr, expr: str, place: Place, max_depth: int, max_node
     while level:
         depth, nodes = depth + 1, nodes + len(level)
         if depth > max_depth or nodes > max_nodes:
-            what = "nested too deeply" if depth > max_depth else "too large"
+            fault = "nested too deeply" if depth > max_depth else "too large"
             raise ExpressionError(
-                f"the expression is {what} (at most {max_depth} levels and {max_nodes} parts are allowed)",
+                f"the expression is {fault} (at most {max_depth} levels and {max_nodes} parts are allowed)",
                 place=place.at(expr),
                 remedy="move parts of the expression to [definitions], or group a long sum: (a + b + "
                 "...) + (c + ...)",

@@ -133,7 +133,7 @@ def _convert(node: ast.expr, symbols: Mapping[str, Any]) -> Any:
             return sympy.Piecewise((first, condition), (second, True))
         case ast.Call(func=ast.Name(id=name), args=args):
             return _FUNCTIONS[name](*(_convert(arg, symbols) for arg in args))
-    raise TypeError(f"no checked expression contains {ast.dump(node)}")
+    raise TypeError(f"a checked expression cannot contain {ast.dump(node)}")
 
 
 def _binary(op: ast.operator, left: Any, right: Any) -> Any:

@@ -64,7 +64,7 @@ def value_of(node: ast.expr, values: Mapping[str, float]) -> float | bool:
             return value_of(body if value_of(test, values) else orelse, values)
         case ast.Call(func=ast.Name(id=name), args=args):
             return _finite(node, FUNCTIONS[name].value, *(value_of(arg, values) for arg in args))
-    raise TypeError(f"no checked expression contains {ast.dump(node)}")
+    raise TypeError(f"a checked expression cannot contain {ast.dump(node)}")
 
 
 def _finite(node: ast.expr, function: Callable[..., float], *arguments: float) -> float:

@@ -53,7 +53,7 @@ def _text(node: ast.expr) -> tuple[str, int]:
             return text, _CONDITIONAL
         case ast.Call(func=ast.Name(id=name), args=args):
             return f"{name}({', '.join(write(arg) for arg in args)})", _ATOM
-    raise TypeError(f"no checked expression contains {ast.dump(node)}")
+    raise TypeError(f"a checked expression cannot contain {ast.dump(node)}")
 
 
 def _unsigned(text: str) -> str:

@@ -27,7 +27,8 @@ class Ownership:
             )
         if self._is_busy:
             raise UsageError(
-                f"{call}() was called during another call of the same simulator", remedy="use sim.copy()"
+                f"{call}() was called during another call of the same simulator",
+                remedy="use a separate sim.copy() for the inner call",
             )
         return self
 

@@ -66,9 +66,9 @@ def require_fit(saved: SavedState, model: Model, about: str) -> None:
     own = saved.position.run.model
     fits = own.structure() == model.structure() and own.with_values_of(model) == model
     if not fits or about != saved.about:
-        what = f"other settings, {saved.about}" if fits else f"another model, {own.name}"
+        other_owner = f"other settings, {saved.about}" if fits else f"another model, {own.name}"
         raise UsageError(
-            f"`saved` belongs to {what}",
+            f"`saved` belongs to {other_owner}",
             remedy="restore the saved state in a simulator with the same model and settings",
         )
 

@@ -151,6 +151,6 @@ class States:
             )
             raise UsageError(
                 f"t = {float(bad)!r} is outside {whole}, which covers t = {low!r} to {high!r}",
-                remedy="use times in this range",
+                remedy="use times that the run covers",
             )
         return times, side

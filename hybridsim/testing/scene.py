@@ -129,7 +129,7 @@ class Scene:
     def __post_init__(self) -> None:
         unknown = set(self.needs) - set(VOCABULARY)
         if unknown:
-            raise ValueError(f"scene {self.name} requires unknown capabilities: {sorted(unknown)}")
+            raise ValueError(f"test case {self.name} requires unknown capabilities: {sorted(unknown)}")
 
 
 def named(name: str, span: tuple[float, float], truth: Truth, *rest: Any, **more: Any) -> Scene:

@@ -156,7 +156,7 @@ def test_results_into_a_file_in_place_of_a_folder(hybridsim: Callable, tmp_path:
     (tmp_path / "taken").write_text("")
     code, _, err = hybridsim("compare", "dfcs", "--out", "taken/here")
     assert code == 2
-    assert "taken is a file" in err
+    assert "taken is a file, not a folder" in err
 
 
 def test_picture_where_nothing_may_be_written(hybridsim: Callable, tmp_path: Path) -> None:

@@ -204,7 +204,9 @@ def _spread(model: Model, question: Question, full: Any, ranges: Any, limits: Li
     try:
         return spread(model, question, full, ranges, limits.time_budget())
     except NoAnswer as reason:
-        raise SimulationError(f"{question.text} has no value at one end of the ranges: {reason}") from reason
+        raise SimulationError(
+            f"{question.text} has no value at one end of the ranges in `uncertain`: {reason}"
+        ) from reason
 
 
 def _chosen(names: Sequence[str] | None) -> tuple[LadderStep, ...]:

@@ -160,7 +160,7 @@ class Question:
         except (TypeError, ValueError, OverflowError):
             raise NoAnswer(f"`quantity` returned {value!r}, which is not a number") from None
         if not math.isfinite(abs(found)):
-            raise NoAnswer(f"`quantity` returned {value!r}")
+            raise NoAnswer(f"`quantity` returned {value!r}, which is not finite")
         return found
 
     def _event_time(self, motion: Any) -> float:
@@ -279,7 +279,7 @@ def question_of(model: Model, quantity: Any, t_span: tuple[float, float] | None,
     if name not in names:
         raise UsageError(f"`quantity` is unknown: {quantity!r}", remedy=nearest(name, names, kind=head))
     if number and head not in ("harmonic", "event_time"):
-        raise UsageError(f"`quantity` cannot be {quantity!r}", remedy=f"write {head}.{name}")
+        raise UsageError(f"`quantity` cannot be {quantity!r}", remedy=f"write only {head}.{name}")
     if head == "event_time" and number and int(number) < 1:
         raise UsageError(f"`quantity` cannot be {quantity!r}", remedy="use an event number from 1 on")
     return Question(quantity, None, t_span, accuracy)

@@ -51,12 +51,12 @@ def mapping(value: Any, what: str) -> Mapping[str, Any]:
     return value
 
 
-def checked_names(values: Any, what: str) -> tuple[str, ...]:
+def checked_names(values: Any, argument: str) -> tuple[str, ...]:
     """Return a tuple of names; a single name becomes a tuple of length one."""
-    found = (values,) if isinstance(values, str) else tuple(_row(values, what, "use names"))
+    found = (values,) if isinstance(values, str) else tuple(_row(values, argument, "use names"))
     for value in found:
         if not isinstance(value, str):
-            raise UsageError(f"`{what}` cannot contain {value!r}", remedy="use names")
+            raise UsageError(f"`{argument}` cannot contain {value!r}", remedy="use names")
     return found
 
 

@@ -101,7 +101,8 @@ def choose_series(
     repeated = [label for label in labels if labels.count(label) > 1]
     if repeated:
         raise UsageError(
-            f"two lines have the label {repeated[0]!r}", remedy="use a different label for each line"
+            f"two series of runs have the label {repeated[0]!r}",
+            remedy="use a different label for each series",
         )
     return tuple(chosen)
 

@@ -189,7 +189,7 @@ class _Follower:
                     at = here.point.parameter
                     return (
                         found,
-                        f"{self.parameter} = {at:.9g} (no orbit next to it was found: it grazes or ends there)",
+                        f"{self.parameter} = {at:.9g} (no further orbit: the branch ends there or touches a guard)",
                     )
                 continue
             value = there.point.parameter

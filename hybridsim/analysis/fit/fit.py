@@ -103,9 +103,11 @@ def fit(
     refuse_unknown([simulate], options)
     for name in ("t_eval", "keep", "save", "params", "x0", "progress"):
         if name in options:
-            raise UsageError(f"a fit sets {name!r} itself", remedy="describe the experiment with hs.Record")
+            raise UsageError(
+                f"fit() sets the option {name!r} itself", remedy="describe each experiment by hs.Record(...)"
+            )
     if text(loss, "loss") not in _LOSSES:
-        raise UsageError(f"`loss` is {loss!r}", remedy=f"use one of {', '.join(_LOSSES)}")
+        raise UsageError(f"`loss` cannot be {loss!r}", remedy=f"use one of {', '.join(_LOSSES)}")
     count = 1 if starts is None else whole_number(starts, "starts", 1, 10_000)
     most = whole_number(max_evaluations, "max_evaluations", 1, 1_000_000)
     checked = unknowns_of(model, unknowns)
@@ -174,5 +176,5 @@ def _noise_of(noise: Any, residuals: Residuals) -> dict[str, float] | None:
     found = {name: number(value, f"noise of {name}") for name, value in noise.items()}
     for name, value in found.items():
         if not (value > 0.0 and math.isfinite(value)):
-            raise UsageError(f"the noise of {name} is {value!r}", remedy="use a positive number")
+            raise UsageError(f"the noise of {name} cannot be {value!r}", remedy="use a positive number")
     return found

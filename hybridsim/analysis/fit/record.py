@@ -80,7 +80,7 @@ class Record:
         if start > t[0]:
             raise UsageError(
                 f"t0 is {start!r}, after the first time {float(t[0])!r} of the record",
-                remedy="use an earlier t0",
+                remedy="use a t0 at or before the first time of the record",
             )
         if not columns:
             raise _nothing_measured(dropped)
@@ -209,6 +209,6 @@ def _numbers(column: Any, name: str) -> np.ndarray:
     if None in values:
         raise UsageError(
             f"column {name!r} contains a value that is not a number",
-            remedy="use numbers, and NaN for missing numbers",
+            remedy="use a number at each time, and NaN where a number is missing",
         )
     return np.array(values, dtype=float)

@@ -120,7 +120,7 @@ class Fit(Readable):
         known_name(name, tuple(self.values), "`name` of an unknown cannot be", "unknowns")
         if not 0.0 < number(level, "level") < 1.0:
             raise UsageError(
-                f"`level` is {level!r}", remedy="use a probability between 0 and 1, such as 0.95"
+                f"`level` cannot be {level!r}", remedy="use a probability between 0 and 1, such as 0.95"
             )
         quantile = float(student.ppf(0.5 + 0.5 * level, max(self.degrees_of_freedom, 1)))
         value, error = self.values[name], self.errors[name]

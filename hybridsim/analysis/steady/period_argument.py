@@ -80,10 +80,11 @@ def refuse_plain_time(system: System, period: float | None) -> None:
     inputs = [signal.name for signal in model.inputs]
     names = [*system.names, *sorted(discrete), *inputs, *model.variables()]
     numbers = {name: 0.739 + 0.0618 * k for k, name in enumerate(names)} | model.parameter_values()
-    for what, tree in _with_time(model):
+    for declaration, tree in _with_time(model):
         if period is None:
             raise UsageError(
-                f"{what} contains t outside of sines and cosines, so the period of model {model.name} is unknown",
+                f"{declaration} contains t outside of sines and cosines, so the period of model {model.name} is "
+                "unknown",
                 remedy="if the motion is periodic, pass `period`",
             )
         if meanings.depended_on(names_of(tree)) & discrete:
@@ -96,7 +97,7 @@ def refuse_plain_time(system: System, period: float | None) -> None:
         for t, (now, later) in zip(times, pairs, strict=True):
             if now is not None and later is not None and abs(later - now) > _REPEATS * largest:
                 raise UsageError(
-                    f"{what} does not repeat after the period {period:g}: it changes by {later - now:.4g} from "
+                    f"{declaration} does not repeat after the period {period:g}: it changes by {later - now:.4g} from "
                     f"t = {t:.4g} to t = {t + period:.4g}",
                     remedy="pass the period of the forcing, or replace a ramp by its final value",
                 )

@@ -163,9 +163,9 @@ class StructureSteadyState(SteadyState):
         """Raise an error, because a run of a `MechanicalSystem` provides no derivatives."""
         self._refuse_derivatives("sensitivities")
 
-    def _refuse_derivatives(self, what: str) -> NoReturn:
+    def _refuse_derivatives(self, measure: str) -> NoReturn:
         raise UsageError(
-            f"{self.model.name} is a MechanicalSystem, whose steady states have no {what}",
+            f"{self.model.name} is a MechanicalSystem, whose steady states have no {measure}",
             remedy="use hs.steady_state(system.to_model()) if the contact velocities are independent",
         )
 

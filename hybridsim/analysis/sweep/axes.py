@@ -160,7 +160,7 @@ def _settings(name: str, row: Any) -> tuple[float | Expression, ...]:
         )
     found = tuple(_setting(name, value) for value in islice(row, MOST_POINTS + 1))
     if not found:
-        raise UsageError(f"{name} has no values", remedy="use at least one value")
+        raise UsageError(f"the list of values of {name} is empty", remedy="use at least one value")
     return found
 
 

@@ -115,12 +115,13 @@ def bifurcation(
     refuse_unknown([simulate], options)
     for name in ("keep", "save", "t_eval"):
         if name in options:
-            raise UsageError(f"bifurcation() sets {name!r} itself", remedy=f"remove `{name}`")
+            raise UsageError(f"bifurcation() sets the option {name!r} itself", remedy=f"remove `{name}`")
     base = chosen_model(model, params).validate()
     points = points_of(base, {text(parameter, "parameter"): values}, "list")
     if points.axes[0].is_start:
         raise UsageError(
-            f"{parameter} is a state", remedy="vary a parameter; initial values are swept with hs.sweep"
+            f"{parameter} is a state, but bifurcation() varies a parameter",
+            remedy="sweep initial values with hs.sweep",
         )
     with_level, level = with_section(base, section)
     measure = Section(

@@ -147,7 +147,7 @@ def named_measure(
         is_harmonic = word.startswith("harmonic.") and last.isdecimal()
         if AFTER in options and word in _OF_MOTION and word not in OF_MOTION:
             raise UsageError(
-                f"{word} belongs to a steady state, but `after` measures one period of an ordinary run",
+                f"the measure {word} belongs to a steady state, but `after` measures one period of an ordinary run",
                 remedy=f"remove {word} or `after`; use 'residual' to measure how closely a run repeats",
             )
         if (f"{stem}.1" if is_harmonic else word) not in known:

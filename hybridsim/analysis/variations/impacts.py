@@ -131,9 +131,9 @@ class Impacts:
         """Return the matrix of the linear equations for the impulses, and the impulses."""
         found = answers(problem)
         if len(found) != 1 or found[0].reduced:
-            what = "whose rebound was reduced to lose energy" if found else "whose outcome is not unique"
+            reason = "whose rebound was reduced to lose energy" if found else "whose outcome is not unique"
             raise UsageError(
-                f"derivatives are not supported through the impact of {names} at t = {t:.9g}, {what}",
+                f"derivatives are not supported through the impact of {names} at t = {t:.9g}, {reason}",
                 remedy="use a run that ends before this time",
             )
         answer, k = found[0], problem.normal

@@ -25,9 +25,9 @@ def add_to(commands: Any) -> None:
     """Add the command `atlas` to the parser."""
     parser = commands.add_parser(
         "atlas",
-        help="run all integrators on the benchmark scenes and report failures",
-        description="Run benchmark scenes with known answers with every integrator and with other common methods. "
-        "Report for each pair: right, wrong answer, wrong mode sequence, hang (bounded) or refused.",
+        help="run all integrators on benchmark problems (scenes) and report failures",
+        description="Run benchmark problems (scenes) with known answers, with every integrator and with other common "
+        "methods. Report for each pair: right, wrong answer, wrong mode sequence, hang (bounded) or refused.",
         epilog="The folder receives atlas.json, matrix.png, index.md, and a page and a folder of pictures for each "
         "class. A full run takes about ten minutes on two processors.",
     )
@@ -54,7 +54,8 @@ def execute(args: argparse.Namespace, session: Session) -> int:
     """Run the test cases, print a table of counts and write the results."""
     if args.scenes and args.trouble:
         raise UsageError(
-            "Names of scenes and --class cannot be combined", remedy="remove --class or the names"
+            "names of scenes and --class cannot be combined",
+            remedy="remove --class or the names of the scenes",
         )
     from hybridsim.testing.atlas import atlas, described, listing, scenes_named
 

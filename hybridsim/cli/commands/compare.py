@@ -25,8 +25,8 @@ def add_to(commands: Any) -> None:
     parser = commands.add_parser(
         "compare",
         help="compare error and run time of integrators on a model or on a suite",
-        description="Compare error and run time of integrators on one model or on a suite of scenes. Print a table and "
-        "write a chart and the data.",
+        description="Compare error and run time of integrators on one model, or on a suite of benchmark problems "
+        "(scenes). Print a table and write a chart and the data.",
         epilog="The folder receives chart.png (or suite.png), table.csv and comparison.json.",
     )
     options.add_model_arguments(parser, optional=True)

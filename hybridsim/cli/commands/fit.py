@@ -117,8 +117,8 @@ def _unknown(name: str, text: str) -> tuple[str, hybridsim.Unknown]:
     return name, hybridsim.Unknown(low, high, log=is_log)
 
 
-def _number(text: str, what: str) -> float:
+def _number(text: str, option: str) -> float:
     try:
         return float(text)
     except ValueError:
-        raise UsageError(f"{what}: {text!r} is not a number", remedy="use a decimal number") from None
+        raise UsageError(f"{option}: {text!r} is not a number", remedy="use a decimal number") from None

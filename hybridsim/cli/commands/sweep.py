@@ -237,9 +237,9 @@ def _end_of_all(model: Model, text: str | None, axes: dict[str, list[Any]]) -> f
             with suppress(HybridsimError):  # an invalid value is reported at its own points
                 ends.add(values.end_time(model.with_(**{name: value}), text))
         if len(ends) > 1:
-            what = "the end of the runs" if text is None else f"--t-end {text}"
+            end_time = "the end of the runs" if text is None else f"--t-end {text}"
             raise UsageError(
-                f"{what} depends on the swept parameter {name}, but all runs must end at the same time",
+                f"{end_time} depends on the swept parameter {name}, but all runs must end at the same time",
                 remedy="set --t-end to a number",
             )
     return end

@@ -43,50 +43,50 @@ def check_forms(
     return known
 
 
-def check_range(what: str, array: np.ndarray, low: float, high: float) -> None:
+def check_range(title: str, array: np.ndarray, low: float, high: float) -> None:
     """Raise an error for numbers outside a range; NaN is outside every range."""
     if array.size and not (array.min() >= low and array.max() <= high):
-        raise ValueError(f"{what} is not within {low} to {high}")
+        raise ValueError(f"{title} is not within {low} to {high}")
 
 
-def check_finite(what: str, *arrays: np.ndarray) -> None:
+def check_finite(title: str, *arrays: np.ndarray) -> None:
     """Raise an error for numbers that are not finite."""
     if not all(np.isfinite(array).all() for array in arrays):
-        raise ValueError(f"{what} is not finite")
+        raise ValueError(f"{title} is not finite")
 
 
-def check_ascending(what: str, array: np.ndarray, *, strictly: bool = False) -> None:
+def check_ascending(title: str, array: np.ndarray, *, strictly: bool = False) -> None:
     """Raise an error unless numbers are in ascending order; with `strictly`, equal numbers are also rejected."""
     steps = np.diff(array)
     if not ((steps > 0).all() if strictly else (steps >= 0).all()):
-        raise ValueError(f"{what} is not in ascending order")
+        raise ValueError(f"{title} is not in ascending order")
 
 
-def check_modes(what: str, modes: np.ndarray, counts: Sequence[int], lowest: int = 0) -> None:
+def check_modes(title: str, modes: np.ndarray, counts: Sequence[int], lowest: int = 0) -> None:
     """Raise an error for mode numbers that the components do not have."""
     if not ((modes >= lowest) & (modes < np.asarray(counts, dtype=np.int64))).all():
-        raise ValueError(f"{what} is not a mode of its component")
+        raise ValueError(f"{title} is not a mode of its component")
 
 
-def check_instant(what: str, instant: object) -> tuple[float, float]:
+def check_instant(title: str, instant: object) -> tuple[float, float]:
     """Return a time given as two finite doubles, or raise an error."""
     if not isinstance(instant, list | tuple) or len(instant) != 2:
-        raise ValueError(f"{what} is not a time")
-    return check_number(what, instant[0]), check_number(what, instant[1])
+        raise ValueError(f"{title} is not a time")
+    return check_number(title, instant[0]), check_number(title, instant[1])
 
 
-def check_number(what: str, value: object, low: float = -math.inf, *, is_finite: bool = True) -> float:
+def check_number(title: str, value: object, low: float = -math.inf, *, is_finite: bool = True) -> float:
     """Return a number that is at least `low`, or raise an error."""
     if type(value) not in (int, float):
-        raise ValueError(f"{what} is {value!r}")
+        raise ValueError(f"{title} is {value!r}")
     found = float(value)  # type: ignore[arg-type]  # it is a number
     if not found >= low or (is_finite and not math.isfinite(found)):
-        raise ValueError(f"{what} is {value!r}")
+        raise ValueError(f"{title} is {value!r}")
     return found
 
 
-def check_count(what: str, value: object, most: float = 2**62) -> int:
+def check_count(title: str, value: object, most: float = 2**62) -> int:
     """Return a whole number that is not negative, or raise an error."""
     if type(value) is not int or not 0 <= value <= most:
-        raise ValueError(f"{what} is {value!r}")
+        raise ValueError(f"{title} is {value!r}")
     return value

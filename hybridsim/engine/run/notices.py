@@ -138,8 +138,8 @@ class Notices:
             (name, count), *_ = Counter(o.component for o in last).most_common(1)
             self.record.warn(
                 f"chattering: from t = {float(last[0].instant):.9g}, {count} of {_EVENTS} events within "
-                f"{abs(times[-1]):.3g} belong to {name}, and no state moves by more than {_SHARE:g} of its range "
-                "between two of them. Declare a switching surface or a wider hysteresis."
+                f"{abs(times[-1]):.3g} time units belong to {name}, and no state moves by more than {_SHARE:g} of its "
+                "range between two of these events. Declare a switching surface or a wider hysteresis."
             )
 
     # -- stiffness ------------------------------------------------------------------------------------------

@@ -152,4 +152,4 @@ class NativeStepper:
 
     def restep(self, step: Step, s: float) -> Step:
         """Raise NotImplementedError; a step of `solve_ivp` already ends at its event."""
-        raise NotImplementedError("solve_ivp ends its step at the event itself")
+        raise NotImplementedError("a step of solve_ivp already ends at its event")

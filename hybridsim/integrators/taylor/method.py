@@ -92,7 +92,7 @@ class TaylorStepper:
         if self.creeping == _CREEPING:
             raise Creeping(
                 f"{_CREEPING} consecutive steps were discarded because they were 100 times shorter than the Taylor "
-                f"series allow; the last step was {h:.3g}",
+                f"series allow; the last step had the length {h:.3g}",
                 self.since,
             )
         if not h > 0.0:

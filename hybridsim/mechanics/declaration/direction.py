@@ -13,12 +13,12 @@ from hybridsim.model.parts.declared import Declared
 _MOVES = "; for coefficients that vary in time or space write an hs.Model, starting from system.to_model()"
 
 
-def finite(part: Declared, what: str, value: Any) -> float:
+def finite(part: Declared, argument: str, value: Any) -> float:
     """Return a finite number, or raise an error that names the argument."""
     number = as_real(value)
     if number is None or not math.isfinite(number):
         raise part._fault(
-            f"`{what}` cannot be {value!r}", "use finite numbers" + _MOVES * isinstance(value, str)
+            f"`{argument}` cannot be {value!r}", "use finite numbers" + _MOVES * isinstance(value, str)
         )
     return number
 
@@ -35,7 +35,9 @@ def weights(part: Declared, direction: Any) -> tuple[tuple[tuple[int, float], ..
     entries = [(i, finite(part, "direction", w)) for i, w in row]
     for i, _ in entries:
         if not isinstance(i, Integral):
-            raise part._fault(f"`direction` names the coordinate {i!r}", "use whole numbers, counted from 0")
+            raise part._fault(
+                f"`direction` contains the coordinate {i!r}", "use whole numbers, counted from 0"
+            )
     pairs = tuple((int(i), w) for i, w in entries if w != 0.0)
     if not pairs:
         raise part._fault("the direction is zero", "use at least one weight that is not zero")

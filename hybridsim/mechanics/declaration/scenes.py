@@ -192,9 +192,14 @@ def three_coupled_blocks(
     >>> [contact.normal for contact in hs.three_coupled_blocks().contacts]
     [30.0, 20.0, 10.0]
     """
-    coefficients = numbers(mu, "mu", "use three numbers")
+    coefficients = numbers(
+        mu, "mu", "use three numbers, the coefficients of friction from the lowest contact up"
+    )
     if len(coefficients) != 3:
-        raise UsageError(f"`mu` cannot be {mu!r}", remedy="use three numbers")
+        raise UsageError(
+            f"`mu` cannot be {mu!r}",
+            remedy="use three numbers, the coefficients of friction from the lowest contact up",
+        )
     directions = [[1.0, 0.0, 0.0], [-1.0, 1.0, 0.0], [0.0, -1.0, 1.0]]
     contacts = [
         MechanicalContact(

@@ -104,9 +104,9 @@ class MechanicalContact(Declared):
         elif not isinstance(law, FrictionLaw):
             raise self._fault(f"`law` cannot be {law!r}", "use hs.FrictionLaw(...), or the name of a law")
         if not self.law.is_set_valued or self.law.tables:
-            what = "tables" if self.law.tables else "a direct force instead of slip and stick"
+            unsupported = "tables" if self.law.tables else "a direct force instead of slip and stick"
             raise self._fault(
-                f"the law '{self.law.name}' has {what}",
+                f"the law '{self.law.name}' has {unsupported}",
                 "use a law with slip and stick forces, or write the system as an hs.Model with hs.Contact",
             )
         object.__setattr__(self, "normal", finite(self, "normal", self.normal))
@@ -193,9 +193,9 @@ class MechanicalSystem:
         title: str = "",
         source: str = "",
     ) -> None:
-        for what, text in (("name", name), ("title", title), ("source", source)):
+        for argument, text in (("name", name), ("title", title), ("source", source)):
             if not isinstance(text, str):
-                raise UsageError(f"MechanicalSystem: `{what}` cannot be {text!r}", remedy="use a string")
+                raise UsageError(f"MechanicalSystem: `{argument}` cannot be {text!r}", remedy="use a string")
         self.name, self.title, self.source = name, title, source
         self.M = _matrix(M, "M", None)
         require_positive_definite(self.M, name)
@@ -211,13 +211,13 @@ class MechanicalSystem:
         self.velocities = tuple(f"v{i + 1}" if names is None else f"v_{x}" for i, x in enumerate(self.names))
         self._check()
 
-    def _parts(self, declared: Any, what: str, kind: type[Part]) -> tuple[Part, ...]:
+    def _parts(self, declared: Any, argument: str, kind: type[Part]) -> tuple[Part, ...]:
         """Return the contacts or the impacts as a tuple, after checking their types."""
         parts = as_tuple(declared)
         for part in parts:
             if not isinstance(part, kind):
                 raise UsageError(
-                    f"{self.name}: {what} contain {part!r}", remedy=f"use hs.{kind.__name__}(...) objects"
+                    f"{self.name}: {argument} contain {part!r}", remedy=f"use hs.{kind.__name__}(...) objects"
                 )
         return parts
 
@@ -258,11 +258,11 @@ class MechanicalSystem:
                 found[int(i)] = nonzero
         return found
 
-    def _start(self, start: Any, what: str) -> np.ndarray:
+    def _start(self, start: Any, name: str) -> np.ndarray:
         remedy = f"use {self.n} finite numbers"
-        values = np.zeros(self.n) if start is None else real_array(start, f"{self.name}: `{what}`", remedy)
+        values = np.zeros(self.n) if start is None else real_array(start, f"{self.name}: `{name}`", remedy)
         if values.shape != (self.n,):
-            raise UsageError(f"{self.name}: `{what}` cannot be {start!r}", remedy=remedy)
+            raise UsageError(f"{self.name}: `{name}` cannot be {start!r}", remedy=remedy)
         return values
 
     def _check(self) -> None:
@@ -276,16 +276,16 @@ class MechanicalSystem:
         if twice:
             raise UsageError(f"{self.name}: the name {twice[0]!r} is used twice", remedy="use each name once")
         for contact in self.all_contacts:
-            what = "contact" if isinstance(contact, MechanicalContact) else "impact"
+            kind = "contact" if isinstance(contact, MechanicalContact) else "impact"
             if contact.weights not in (0, self.n):
                 raise UsageError(
-                    f"{what} {contact.name}: its direction has {contact.weights} weights for {self.n} coordinates",
+                    f"{kind} {contact.name}: its direction has {contact.weights} weights for {self.n} coordinates",
                     remedy="use one weight for each coordinate, or a mapping from coordinates to weights",
                 )
             for i, _ in contact.direction:
                 if not 0 <= i < self.n:
                     raise UsageError(
-                        f"{what} {contact.name}: its direction has coordinate {i}, but there are {self.n} coordinates",
+                        f"{kind} {contact.name}: its direction has coordinate {i}, but there are {self.n} coordinates",
                         remedy="number the coordinates from 0",
                     )
 
@@ -327,24 +327,24 @@ class MechanicalSystem:
         )
 
 
-def _matrix(entries: Any, what: str, n: int | None) -> Any:
+def _matrix(entries: Any, name: str, n: int | None) -> Any:
     """Return a square matrix as scipy.sparse.csr_array; a single row of numbers becomes a diagonal matrix."""
     from scipy import sparse
 
     if entries is None and n is not None:
         return sparse.csr_array((n, n))
     if sparse.issparse(entries):
-        real_array(entries.data, what, "use finite real numbers")
+        real_array(entries.data, name, "use finite real numbers")
         matrix = sparse.csr_array(entries, dtype=float)
     else:
-        dense = real_array(entries, what, "use finite real numbers, (n, n), or (n,) for a diagonal")
+        dense = real_array(entries, name, "use finite real numbers, (n, n), or (n,) for a diagonal")
         if dense.ndim not in (1, 2):
             raise UsageError(
-                f"{what} has {dense.ndim} dimensions", remedy="use shape (n, n), or (n,) for a diagonal"
+                f"{name} has {dense.ndim} dimensions", remedy="use shape (n, n), or (n,) for a diagonal"
             )
         matrix = sparse.csr_array(sparse.diags_array(dense) if dense.ndim == 1 else dense)
     if not matrix.shape[0]:
-        raise UsageError(f"{what} is empty", remedy="use at least one coordinate")
+        raise UsageError(f"{name} is empty", remedy="use at least one coordinate")
     if matrix.shape[0] != matrix.shape[1] or (n is not None and matrix.shape[0] != n):
-        raise UsageError(f"{what} has shape {matrix.shape}", remedy=f"use shape ({n or 'n'}, {n or 'n'})")
+        raise UsageError(f"{name} has shape {matrix.shape}", remedy=f"use shape ({n or 'n'}, {n or 'n'})")
     return matrix

@@ -173,8 +173,8 @@ def _of_signs(functions: Sequence[_EventFunction]) -> Iterator[Caution]:
         meant = "at the end of the mode" if item.is_guard else "at the event"
         remedy = f"write an expression that changes its sign {meant}"
         if not item.reading.changes(item.expr):
-            so = "in this mode, so it fires immediately or never" if item.is_guard else "and never fires"
-            yield Caution(f"{item.what} is constant {so}", item.place, remedy)
+            where = "in this mode, so it fires immediately or never" if item.is_guard else "and never fires"
+            yield Caution(f"{item.what} is constant {where}", item.place, remedy)
         elif found := item.reading.one_sided(item.expr):
             sign, reason = found
             fires = "never fires" if item.is_guard else "fires only if it remains at zero"

@@ -130,13 +130,17 @@ class Scope(Findings):
                     )
                 kind = "the time" if name == TIME else f"the {self.kinds.get(name, 'output')}"
                 remedy = f"allowed here: {', '.join(sorted(allowed)) or 'numbers'}"
-                raise expr.error(f"{kind} '{name}' cannot be used here", remedy=remedy)
+                raise expr.error(f"{kind} '{name}' cannot be used in this expression", remedy=remedy)
             self._require(expr, allowed)
             if boolean and not expr.is_boolean:
-                raise expr.error(f"'{expr.text}' is a number", remedy="write a condition, such as 'x > 0'")
+                raise expr.error(
+                    f"'{expr.text}' is a number, but a condition is needed",
+                    remedy="write a condition, such as 'x > 0'",
+                )
             if expr.is_boolean and not boolean:
                 raise expr.error(
-                    f"'{expr.text}' is a condition", remedy="write an expression with a numeric value"
+                    f"'{expr.text}' is a condition, but a number is needed",
+                    remedy="write an expression with a numeric value",
                 )
         except ExpressionError as fault:
             place = fault.place or Place(text=expr.text)

@@ -122,16 +122,18 @@ class Element(Declared):
 
     def refuse_unless_complete(self) -> None:
         """Raise an error for an unknown kind, for missing fields, and for fields that the kind does not have."""
-        what = f"element {self.name}"
+        element = f"element {self.name}"
         if self.kind not in KINDS:
-            raise self.error(f"{what}: unknown kind '{self.kind}'", nearest(self.kind, KINDS, kind="kinds"))
+            raise self.error(
+                f"{element}: unknown kind '{self.kind}'", nearest(self.kind, KINDS, kind="kinds")
+            )
         required, optional = KINDS[self.kind]
         for field in required:
             if getattr(self, field) is None:
-                raise self.error(f"{what} of kind {self.kind} needs '{field}'", f"set '{field}'")
+                raise self.error(f"{element} of kind {self.kind} needs '{field}'", f"set '{field}'")
         known = {"name", "kind", "place", *required, *optional}
         for field in self.__dataclass_fields__:
             if field not in known and getattr(self, field) is not None:
-                raise self.error(f"{what} of kind {self.kind} cannot have '{field}'", f"remove '{field}'")
+                raise self.error(f"{element} of kind {self.kind} cannot have '{field}'", f"remove '{field}'")
         if self.initial not in (None, "on", "off"):
-            raise self.error(f"{what}: unknown initial mode '{self.initial}'", "use 'on' or 'off'")
+            raise self.error(f"{element}: unknown initial mode '{self.initial}'", "use 'on' or 'off'")

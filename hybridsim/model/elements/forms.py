@@ -146,17 +146,17 @@ class _Forms:
 
     def _rate(self, element: Element) -> Expression:
         """Return the rate of a backlash's input; raise an error if the input or its rate jumps."""
-        what = f"element {element.name}: the input"
+        title = f"element {element.name}: the input"
         jumping = _jumping(self.model)
         for name in sorted(inlined(element.input, dict(self.definitions)).names):
             if name in jumping:
                 raise element.error(
-                    f"{what} of a backlash depends on '{name}', {jumping[name]}",
+                    f"{title} of a backlash depends on '{name}', {jumping[name]}",
                     "use a continuous input whose rate has the same formula in all modes, or write the backlash as "
                     "a component with modes",
                 )
         constants: tuple[Declared, ...] = (*self.model.parameters, *self.model.discrete)
-        return rate_along(element.input, what, self.model.states, self.definitions, constants)
+        return rate_along(element.input, title, self.model.states, self.definitions, constants)
 
     def _delay(self, element: Element) -> None:
         if element.clock is not None and element.ticks is not None and element.time is None:
@@ -165,7 +165,9 @@ class _Forms:
             self._shifted_input(element, element.time)
         else:
             remedy = "set `clock` and `ticks`, or `time` alone for an input of kind 'table' or 'wave'"
-            raise element.error(f"element {element.name}: the delay is not known", remedy)
+            raise element.error(
+                f"element {element.name}: the delay needs either `time`, or `clock` and `ticks`", remedy
+            )
 
     def _queue(self, element: Element, clock: str, ticks: int) -> None:
         """Add discrete states that store the last samples; each tick of the clock shifts the samples by one place."""
@@ -183,11 +185,11 @@ class _Forms:
 
     def _shifted_input(self, element: Element, time: Expression) -> None:
         """Add a copy of a table or wave, delayed by a given time."""
-        what = f"element {element.name}"
+        title = f"element {element.name}"
         signal = next((one for one in self.inputs if one.name == element.input.text), None)
         if signal is None or signal.kind not in ("table", "wave"):
             raise element.error(
-                f"{what}: '{element.input.text}' cannot be delayed by a fixed time, because a model does not store "
+                f"{title}: '{element.input.text}' cannot be delayed by a fixed time, because a model does not store "
                 "past states",
                 "set `clock` and `ticks` to delay a sampled value, or approximate the delay by further states; `time` "
                 "delays inputs of kind 'table' and 'wave'",
@@ -198,7 +200,7 @@ class _Forms:
             self.inputs.append(replace(signal, name=element.name, phase=later, place=element.place))
         elif not time.is_number:
             raise element.error(
-                f"{what}: the delay of a table cannot be '{time.text}'", "use a number for `time`"
+                f"{title}: the delay of a table cannot be '{time.text}'", "use a number for `time`"
             )
         else:
             times = tuple(at + evaluate(time, {}) for at in signal.times)

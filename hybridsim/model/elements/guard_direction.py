@@ -47,17 +47,19 @@ def without_directions(components: Iterable[Component], definitions: Iterable[De
 
 def _refuse(component: Component, guard: Guard, direction: str) -> None:
     """Raise an error for a guard that cannot have a direction."""
-    what = f"component {component.name}, guard {guard.name}"
+    title = f"component {component.name}, guard {guard.name}"
     if direction not in DIRECTIONS:
         raise guard.error(
-            f"{what}: unknown direction '{direction}'", nearest(direction, DIRECTIONS, kind="directions")
+            f"{title}: unknown direction '{direction}'", nearest(direction, DIRECTIONS, kind="directions")
         )
-    what += ": a direction is not possible"
     if component.surface is not None:
-        raise guard.error(f"{what}, because the surface selects the next mode", "remove `direction`")
+        raise guard.error(
+            f"{title} cannot have a direction, because the surface selects the next mode",
+            "remove `direction`",
+        )
     if isinstance(guard.expr, FunctionExpression):
         remedy = "write the guard as an expression, or use hs.Monitor with this direction and a reset"
-        raise guard.error(f"{what} for a Python function", remedy)
+        raise guard.error(f"{title} cannot have a direction, because it is a Python function", remedy)
 
 
 def _word(label: str) -> str:

@@ -56,8 +56,8 @@ def wrong_reactions(model: Model) -> Iterator[tuple[Contact, str, str]]:
                 yield (
                     contact,
                     f"contact {contact.name}: its force drives '{state.name}' in the direction of slip",
-                    "the force opposes the relative velocity: correct its sign in the derivative, unless inertia "
-                    "couples the bodies",
+                    "a friction force must oppose the relative velocity: correct its sign in the derivative, unless "
+                    "inertia couples the bodies",
                 )
 
 

@@ -121,10 +121,10 @@ class Declared(metaclass=_Refusing):
             sizes = {key: self._real(f"{name}[{key!r}]", value) for key, value in items.items()}
             object.__setattr__(self, name, FrozenMap(sizes))
 
-    def _real(self, what: str, value: object) -> float:
+    def _real(self, field: str, value: object) -> float:
         """Return a real number as float; numbers beyond the range of floats become infinite."""
         if not isinstance(value, Real):
-            raise self._fault(f"`{what}` cannot be {value!r}", f"use a number, or omit `{what}`")
+            raise self._fault(f"`{field}` cannot be {value!r}", f"use a number, or omit `{field}`")
         try:
             return float(value)
         except OverflowError:

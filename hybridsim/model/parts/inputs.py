@@ -160,9 +160,9 @@ class Input(Declared):
         assert self.file is not None
         extra = [name for name in ("times", "values") if getattr(self, name)]
         if self.kind != "table" or extra:
-            what = f"`{extra[0]}`" if extra else f"the kind '{self.kind}'"
+            other_field = f"`{extra[0]}`" if extra else f"the kind '{self.kind}'"
             raise self._fault(
-                f"`file` and {what} cannot be combined", "use `file` for an input of kind 'table'"
+                f"`file` and {other_field} cannot be combined", "use `file` for an input of kind 'table'"
             )
         pair: object = self.columns
         is_pair = isinstance(pair, list | tuple) and len(pair) == 2

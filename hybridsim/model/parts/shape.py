@@ -114,7 +114,9 @@ class Shape(Declared):
                 object.__setattr__(self, field, self._point(field, getattr(self, field)))
         for field, counts in (("ends", (0, 2)), ("size", (0, 1, 2))):
             if len(as_tuple(getattr(self, field))) not in counts:
-                raise self._fault(f"`{field}` cannot be {getattr(self, field)!r}", "use two entries")
+                raise self._fault(
+                    f"`{field}` cannot be {getattr(self, field)!r}", f"use two entries in `{field}`"
+                )
         ends = [end if isinstance(end, str) else self._point("ends", end) for end in as_tuple(self.ends)]
         object.__setattr__(self, "ends", tuple(ends))
         object.__setattr__(self, "points", tuple(self._point("points", p) for p in as_tuple(self.points)))

@@ -93,23 +93,23 @@ class Use(Declared):
             values = {key: self._values(f"{name}[{key!r}]", value, single) for key, value in items.items()}
             object.__setattr__(self, name, FrozenMap(values))
 
-    def _values(self, what: str, value: Any, single: Callable[[str, Any], Any]) -> tuple[Any, ...]:
+    def _values(self, field: str, value: Any, single: Callable[[str, Any], Any]) -> tuple[Any, ...]:
         """Return one value for all copies, or one for each copy; a pair (law, parameters) is a single value."""
         is_pair = isinstance(value, tuple) and len(value) == 2 and isinstance(value[1], Mapping)
         listed = value if isinstance(value, list | tuple) and not is_pair else [value]
         if len(listed) != 1 and len(listed) != self.repeat:
             copies = f"{self.repeat} copies" if self.repeat else "one copy"
-            raise self._fault(f"`{what}` has {len(listed)} values for {copies}", "use one value per copy")
-        return tuple(single(what, one) for one in listed)
+            raise self._fault(f"`{field}` has {len(listed)} values for {copies}", "use one value per copy")
+        return tuple(single(field, one) for one in listed)
 
-    def _parsed_value(self, what: str, value: Any) -> IndexedExpression:
+    def _parsed_value(self, field: str, value: Any) -> IndexedExpression:
         try:
             return parse_indexed(value, self.place)
         except ExpressionError as fault:
-            message = f"{self._title}, {what}: {fault.message}"
+            message = f"{self._title}, {field}: {fault.message}"
             raise ExpressionError(message, place=fault.place, remedy=fault.remedy) from None
 
-    def _law(self, what: str, value: Any) -> LawOfUse:
+    def _law(self, field: str, value: Any) -> LawOfUse:
         """Return a law with the values of its parameters, from a law, a name, a path, or a pair with values."""
         if isinstance(value, LawOfUse):
             return value
@@ -120,8 +120,8 @@ class Use(Declared):
             law = load_law(law)
         if not isinstance(law, FrictionLaw) or not isinstance(values, Mapping):
             remedy = "use a law, or a pair (law, parameters), such as ('coulomb', {'mu': 0.3})"
-            raise self._fault(f"`{what}` cannot be {value!r}", remedy)
-        arguments = {name: self._parsed_value(f"{what}, {name}", one) for name, one in values.items()}
+            raise self._fault(f"`{field}` cannot be {value!r}", remedy)
+        arguments = {name: self._parsed_value(f"{field}, {name}", one) for name, one in values.items()}
         return LawOfUse(law, FrozenMap(arguments), self.place)
 
     def numbers(self) -> tuple[int | None, ...]:

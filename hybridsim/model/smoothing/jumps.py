@@ -127,11 +127,7 @@ class Borders:
                 )
         known = [row for row in rows if row is not None]
         distinct = [row for k, row in enumerate(known) if all(_rank([row, other]) > 1 for other in known[:k])]
-        return (
-            "it is one of three surfaces of which one is determined by the other two"
-            if _rank(distinct) < len(distinct)
-            else ""
-        )
+        return "two of the surfaces determine a third one" if _rank(distinct) < len(distinct) else ""
 
     def _slopes(self, argument: ast.expr) -> list[Fraction] | None:
         """Return the coefficients of the states in an argument, or None if the argument is not linear."""

@@ -237,7 +237,9 @@ def _cell(row: list[str], index: int, line: int, path: Path, may_lack: bool) -> 
         raise ModelError(what, place=Place(str(path), line), remedy=remedy)
     if not math.isfinite(float(text)):
         raise ModelError(
-            f"'{text}' is not a finite number", place=Place(str(path), line), remedy="remove the row"
+            f"'{text}' is not a finite number",
+            place=Place(str(path), line),
+            remedy="remove this row from the file",
         )
     return float(text)
 

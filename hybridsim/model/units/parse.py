@@ -113,7 +113,7 @@ class _Reader:
     def unit(self) -> Unit:
         found = self._product()
         if self._at < len(self._tokens):
-            raise _NotAUnit("text after the unit")
+            raise _NotAUnit("the text continues after the unit")
         return found
 
     def _next(self) -> str:

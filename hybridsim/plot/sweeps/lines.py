@@ -50,7 +50,7 @@ def sweep_lines(
     dimensions = list(result.axes) if result.mode == "grid" else [next(iter(result.axes))]
     if len(dimensions) > 2:
         raise UsageError(
-            f"the sweep has {len(dimensions)} parameters",
+            f"the sweep has {len(dimensions)} parameters, but lines show at most two",
             remedy="select a part with at most two parameters by to_xarray().sel(...)",
         )
     lengths = dict(zip(dimensions, result.status.shape, strict=True))

@@ -199,7 +199,7 @@ class Reading:
                 return nodes, lambda chosen, a, b: a if chosen else b
             case ast.Call(func=ast.Name(id=name), args=args):
                 return [self._walk(argument) for argument in args], self._corners()[name]
-        raise TypeError(f"no checked expression contains {ast.dump(tree)}")
+        raise TypeError(f"a checked expression cannot contain {ast.dump(tree)}")
 
     def _corners(self) -> Mapping[str, Callable[..., Number]]:
         sign = self.context.sign

@@ -247,5 +247,5 @@ class Run:
         if len(last_times) == _CROWD and t - last_times[0] <= _CROWDED * (self.t1 - self.t0):
             raise UsageError(
                 f"events accumulate at t = {float(t)!r}: the multiple-precision run cannot pass this time",
-                remedy="declare the mode that begins after this time",
+                remedy="declare the mode that begins after this time, by `limit`",
             )

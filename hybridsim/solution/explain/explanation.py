@@ -328,8 +328,8 @@ def _segment_before(solution: Solution, occurrence: Occurrence) -> Segment | Non
     """Return the segment that ends with an event, or None."""
     if solution._save != "all":
         raise UsageError(
-            f"the run was made with keep={solution._save!r}",
-            remedy="repeat the run with keep='all' to explain events",
+            f"the run was made with keep={solution._save!r}, but explain() needs the whole run",
+            remedy="repeat the run with keep='all'",
         )
     segments = solution._segments
     last = int(np.searchsorted(solution._of_model.frame.starts, float(occurrence.instant), side="right"))

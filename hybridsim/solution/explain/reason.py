@@ -130,14 +130,12 @@ def _decided(system: System, decision: Decision, c: int) -> str:
     whose = _whose(system, c, int(decision.z[c]))
     if taken is not None and taken.verdict != FINE:
         shown = _open_modes(system, taken) or whose
-        better = "" if fine else "no other combination is better: "
-        return f"{shown}: a question of rounding, and {better}a mode is kept if possible"
+        better = "" if fine else "no other combination is better, and "
+        return f"{shown}: rounding leaves the choice open; {better}a mode stays if possible"
     if len(fine) > 1:
         return _of_several(system, decision)
     if not fine:
-        return (
-            f"{whose}: a question of rounding, and no other combination is better: a mode is kept if possible"
-        )
+        return f"{whose}: rounding leaves the choice open; no other combination is better, and a mode stays if possible"
     is_joint = len(fine[0].components) > 1
     if not undecided:
         if is_joint:

@@ -18,7 +18,9 @@ def read() -> dict[str, dict[str, Any]]:
     for trouble in TROUBLES:
         for name, fields in tomllib.loads((HERE / f"{trouble}.toml").read_text("utf-8")).items():
             if name in found:
-                raise ValueError(f"scene {name} is in both {trouble}.toml and {found[name]['trouble']}.toml")
+                raise ValueError(
+                    f"test case {name} is in both {trouble}.toml and {found[name]['trouble']}.toml"
+                )
             found[name] = {"trouble": trouble, **fields}
     return found
 

@@ -102,7 +102,7 @@ def test_a_section_that_is_never_passed_is_a_status() -> None:
 @pytest.mark.parametrize(
     "given, message",
     [
-        ({"parameter": "x"}, "x is a state"),
+        ({"parameter": "x"}, "x is a state, but bifurcation() varies a parameter"),
         ({"parameter": "q"}, "no parameter or state 'q'"),
         ({"samples": 0}, "`samples` cannot be 0"),
         ({"tol": 0}, "`tol` cannot be 0"),

@@ -268,7 +268,7 @@ def test_data_frame() -> None:
     [
         ({"values": {"F": [1]}}, "did you mean 'F0'"),
         ({"values": {}}, "`values` cannot be"),
-        ({"values": {"F0": []}}, "F0 has no values"),
+        ({"values": {"F0": []}}, "the list of values of F0 is empty"),
         ({"values": {"F0": 3.0}}, "use a list of numbers"),
         ({"values": {"F0": [math.inf]}}, "finite"),
         ({"values": {"F0": [None]}}, "a value of F0 cannot be None"),

@@ -264,7 +264,11 @@ def test_an_error_of_a_value_names_the_copy(folder: Path) -> None:
         ("[use.a]\nmodel = 'spring.toml'\nconnect = { u = 1, w = 2 }", "no connected input 'w'", 3),
         ("[use.a]\nmodel = 'spring.toml'\nconnect.u = 1\nparameters.c = 1", "no parameter 'c'", 4),
         ("[use.a]\nmodel = 'spring.toml'\nconnect.u = 1\nstart.k = 1", "no state 'k'", 4),
-        ("[use.a]\nmodel = 'spring.toml'\nconnect.u = 1\nstart.x = 'a.x'", "the state 'a.x' cannot be used here", 4),
+        (
+            "[use.a]\nmodel = 'spring.toml'\nconnect.u = 1\nstart.x = 'a.x'",
+            "the state 'a.x' cannot be used in this expression",
+            4,
+        ),
         ("[use.a]\nmodel = 'sprung.toml'", "the file does not exist", 2),
         ("[use.a]\nmodel = 'dfsc'", "there is no model 'dfsc'", 2),
         ("[use.a]\nmodel = 3", "'model' cannot be a number (3)", 2),

@@ -57,7 +57,7 @@ WRONG = {
     "unequal table": ("values = [1, 0.9]", "values = [1]", "`at` has 2 numbers, but `values` has 1", 15),
     "table falls": ("at = [0, 1]", "at = [1, 0]", "use ascending numbers in `at`", 15),
     "table of texts": ("values = [1, 0.9]", 'values = [1, "a"]', "cubic interpolation needs numbers", 15),
-    "rate unknown": ('normal = "10 + x"', 'normal = "10 + f"', "cannot be used here", 7),
+    "rate unknown": ('normal = "10 + x"', 'normal = "10 + f"', "cannot be used in this expression", 7),
 }
 
 

@@ -36,7 +36,7 @@ def test_without_one_there_is_none() -> None:
         ('"1 - k"', "'duration' cannot be -3"),
         ('"x"', "state 'x'"),
         ('"t"', "time 't'"),
-        ("true", "is a condition"),
+        ("true", "is a condition, but a number is needed"),
     ],
 )
 def test_what_is_no_duration_is_told_with_its_line(written: str, says: str) -> None:

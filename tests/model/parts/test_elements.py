@@ -66,7 +66,11 @@ y = {{ {element} }}
         ),
         ('kind = "delay", input = "w", time = 0.1', "'w' cannot be delayed", "'table' and 'wave'"),
         ('kind = "delay", input = "x", clock = "tack", ticks = 2', "unknown clock 'tack'", "tick"),
-        ('kind = "delay", input = "x", ticks = 2', "the delay is not known", "`clock` and `ticks`"),
+        (
+            'kind = "delay", input = "x", ticks = 2',
+            "the delay needs either `time`, or `clock` and `ticks`",
+            "`clock` and `ticks`",
+        ),
     ],
 )
 def test_an_error_names_the_line_of_the_element(element: str, what: str, remedy: str) -> None:

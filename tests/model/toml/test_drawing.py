@@ -88,7 +88,7 @@ def test_a_part_brings_its_drawing() -> None:
         ('a = { kind = "mass", at = [0, 0], size = [1, 2, 3] }', "'size' cannot be"),
         ('a = { kind = "mass", at = ["x+", 0] }', "m.toml:8: shape a, at.0: invalid expression"),
         ('a = { kind = "mass", at = ["y", 0] }', r"m.toml:8: shape a, at\[0\]: unknown name 'y'"),
-        ('a = { kind = "mass", at = ["x > 1", 0] }', r"'x > 1' is a condition"),
+        ('a = { kind = "mass", at = ["x > 1", 0] }', r"'x > 1' is a condition, but a number is needed"),
         ('a = { kind = "mass", at = [0, 0], mode_of = "g" }', "unknown component 'g'"),
         ('a = { kind = "rod", ends = ["b", [0, 0]] }\nb = { kind = "mass", at = [0, 0] }\nc = 1', "shape c cannot be"),
         ('a = { kind = "rod", ends = ["b", [0, 0]] }', "m.toml:8: shape a: nothing can be fixed to 'b'"),

@@ -144,11 +144,11 @@ class Sending:
 
 def require_sendable(job: Job, cause: BaseException | None = None) -> None:
     """Raise an error if a sweep cannot be sent to another process; the error names the cause."""
-    for what, thing in (("measure", job.measure), ("model", job.model)):
+    for part, thing in (("measure", job.measure), ("model", job.model)):
         try:
             pickle.dumps(thing)
         except Exception as error:  # pickle raises any error of the object's own methods
             raise UsageError(
-                f"the {what} of the sweep cannot be sent to another process ({error})",
+                f"the {part} of the sweep cannot be sent to another process ({error})",
                 remedy="define functions with def at the top level of a module, or remove `executor`",
             ) from (cause or error)

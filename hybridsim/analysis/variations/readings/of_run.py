@@ -70,8 +70,8 @@ def quantities_of(reading: Any, quantities: Sequence[Any]) -> tuple[str, ...]:
     most = len(names) if reading in ("integral", "mean") else 1
     if not 1 <= len(names) <= most:
         raise UsageError(
-            f"{reading} has {len(names)} quantities",
-            remedy=f'use the name of one: of("{reading}", "x")' + " or of several" * (most > 1),
+            f"of() got {len(names)} quantities for the reading {reading!r}",
+            remedy=f'name one quantity: of("{reading}", "x")' + ", or several" * (most > 1),
         )
     return names
 
@@ -136,10 +136,10 @@ class Readings:
             if apart.any():
                 kind = "maximum" if sign > 0 else "minimum"
                 times = " and ".join(f"t = {self._time(one):.9g}" for one in (points[0], place))
-                by = " and ".join(np.array(self._changes)[apart])
+                varied = " and ".join(np.array(self._changes)[apart])
                 raise UsageError(
                     f"{extremes.name} has the same {kind} {place.value:.9g} at {times}, and a change "
-                    f"of {by} makes the two values different, so there is no derivative",
+                    f"of {varied} makes the two values different, so there is no derivative",
                     remedy=self._remedy or "use a part of the run with one of these times, t_span=(a, b)",
                 )
         return points[0].value, slopes[0] + 0.0 * slopes.sum(axis=0)  # NaN if it is NaN at one of the points
@@ -152,10 +152,10 @@ class Readings:
             shift = found.shift(place.number + (place.where == END))
             is_limit = (place.number, place.s) in extremes.limits
             if is_limit and shift.any():
-                by = " and ".join(np.array(self._changes)[shift != 0.0])
+                varied = " and ".join(np.array(self._changes)[shift != 0.0])
                 raise UsageError(
                     f"the extreme value of {extremes.name} is at t = {self._time(place):.9g}, where an event coincides "
-                    f"with an end of the time span; a change of {by} moves the event, so the extreme value has no "
+                    f"with an end of the time span; a change of {varied} moves the event, so the extreme value has no "
                     "derivative",
                     remedy=self._remedy or "use a part of the run that ends earlier or later, t_span=(a, b)",
                 )
@@ -213,10 +213,10 @@ class Readings:
             if abs(jump) <= _JUMPS * size:
                 continue
             if t in (self._low, self._high):
-                by = " and ".join(np.array(self._changes)[shift != 0.0])
+                varied = " and ".join(np.array(self._changes)[shift != 0.0])
                 raise UsageError(
-                    f"{' * '.join(names)} jumps at t = {t:.9g}, exactly at an end of the time span; a change of {by} "
-                    "moves the jump, so the integral has no derivative",
+                    f"{' * '.join(names)} jumps at t = {t:.9g}, exactly at an end of the time span; a change of "
+                    f"{varied} moves the jump, so the integral has no derivative",
                     remedy=self._remedy or "use a part of the run that ends earlier or later, t_span=(a, b)",
                 )
             total += jump * shift
