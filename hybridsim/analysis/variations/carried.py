@@ -47,8 +47,10 @@ from hybridsim.analysis.variations.segment_events import (
     time_rounding,
 )
 from hybridsim.analysis.variations.sizes import sizes
+from hybridsim.analysis.variations.staying_zero import Follower, resets_parted
 from hybridsim.analysis.variations.values.table_slopes import TableValue
 from hybridsim.analysis.variations.values.vector_slopes import VectorSlopes
+from hybridsim.analysis.variations.zero_function import ZeroFunction
 from hybridsim.engine.native.kernels import Precompiled
 from hybridsim.engine.record.segments import Segment
 from hybridsim.engine.system.system import System
@@ -88,13 +90,15 @@ class Carrier:
         Y, Yd = directions.x.copy(), directions.discrete.copy()
         self._changes = Changes(self.system, self._scale, self.own_sizes(directions), G, self._vector)
         self._off: list[OffZero] = []
+        self._zeros: list[ZeroFunction] = []
         event_times, last = EventTimes(self._changes), None
         times: list[tuple[float, np.ndarray]] = []
         starts: list[tuple[np.ndarray, np.ndarray]] = []
         shifts = [np.zeros(G.shape[1])]
         Y, Yd = self._started(self.solution._segments[0], Y, Yd, G, event_times)
         self._flow.prepare(Yd, G)
-        found = None if sided else self._ordinary(Y, Yd, G)
+        Y = self._followed(0, self.solution._segments[0], Y, Yd, G)
+        found = None if sided or self._zeros or self._monitors else self._ordinary(Y, Yd, G)
         if found is not None:
             return found
         all_segment_events = list(segment_events_of(self.solution))
@@ -118,6 +122,7 @@ class Carrier:
             if self._is_end(following.segment) and last is None:
                 last = Last(segment, Y, Yd, behind[2], segment_events.happened)
             Y, Yd, shift = behind
+            Y = self._followed(number + 1, following.segment, Y, Yd, G)
             shifts.append(np.where(self._moves(shift), shift, 0.0))
             if any(one.kind != "corner" for one in segment_events.happened):
                 times.append((float(following.segment.start), shift))
@@ -235,8 +240,9 @@ class Carrier:
             rounds.at_appointment(segment.start, batch)
         before = rates_of(self.system, float(segment.s[0]), x, segment.p, z)
         at = _place(rounds, segment)
-        later = replace(at, s=float(segment.s[:2][-1]), x=segment.x[:2][-1])
-        off = monitors_reached(self._changes, at, later)
+        off, self._monitors = monitors_reached(
+            self._changes, at, _next(at, segment), range(len(self.system.model.monitors))
+        )
         for name, by in self._vector.knots(segment.start):
             begins = by @ G  # a knot that moves off the start to a later time changes the run
             off.append(OffZero(at.origin + at.s, name, begins != 0.0, begins > 0.0, np.zeros(Y.shape)))
@@ -254,6 +260,24 @@ class Carrier:
         is_start: bool = False,
     ) -> Rounds:
         return Rounds(self.system, *before, Y, Yd, self._changes, shift, large, loose, is_start, self._sided)
+
+    def _followed(
+        self, number: int, segment: Segment, Y: np.ndarray, Yd: np.ndarray, G: np.ndarray
+    ) -> np.ndarray:
+        """Return the derivatives at the start of a segment, corrected by functions that stay zero or leave it there."""
+        if not (self._zeros or self._monitors) or len(segment.s) < 2:
+            return Y
+        follower = Follower(
+            self._changes, segment, Yd, lambda stops: self._flow.over(number, Y, Yd, G, stops)
+        )
+        followed = [follower.follow(one) for one in self._zeros]
+        self._zeros = [one for one, _ in followed if one is not None]
+        off = [one for _, found in followed for one in found]
+        if number > 0:
+            at = follower.at_start()
+            fired, self._monitors = monitors_reached(self._changes, at, _next(at, segment), self._monitors)
+            off += fired
+        return Y + self._note(off)
 
     # -- at events ------------------------------------------------------------------------------------------
 
@@ -276,18 +300,26 @@ class Carrier:
         before = rates_of(system, s, x, segment.p, segment.z)
         moved = np.outer(before, shift)
         large = np.maximum(np.abs(Y), np.abs(moved))
-        rounds = self._rounds((x, system.discrete(segment.p), segment.z), Y + moved, Yd, shift, large)
         groups = batches(happened)
-        for k, batch in enumerate(groups):
-            is_due = (
-                any(one.kind == "scheduled" for one in batch)
-                or batch[0].instant.minus(segment.end) > 0.0  # the limit of a series
-                or (k == len(groups) - 1 and is_knot(system, following.start))
-            )
-            if is_due:
-                rounds.at_appointment(following.start, batch)
-            else:
-                rounds.at_end(segment, batch)
+
+        def ran(z: np.ndarray) -> Rounds:
+            rounds = self._rounds((x, system.discrete(segment.p), z), Y + moved, Yd, shift, large)
+            for k, batch in enumerate(groups):
+                is_due = (
+                    any(one.kind == "scheduled" for one in batch)
+                    or batch[0].instant.minus(segment.end) > 0.0  # the limit of a series
+                    or (k == len(groups) - 1 and is_knot(system, following.start))
+                )
+                if is_due:
+                    rounds.at_appointment(following.start, batch)
+                else:
+                    rounds.at_end(segment, batch)
+            return rounds
+
+        rounds = ran(segment.z)
+        if rounds.has_reset and self._zeros:
+            at = Place(s, float(segment.origin), x, segment.p, segment.z, Y, Yd, np.zeros_like(shift), large)
+            self._note(resets_parted(self._changes, self._zeros, at, rounds, ran))
         Yd, immediate = rounds.Yd, rounds.Y
         if self._is_end(
             following
@@ -320,11 +352,17 @@ class Carrier:
         x, before : states and rates (n,) before the instant.
         """
         after = _place(rounds, following)
-        Y, off = off_zero(self._changes, after)
+        Y, off, zeros = off_zero(self._changes, after)
+        self._zeros = [one for one in self._zeros if one.gone is not None] + zeros
         rates = self._rates_at_start(following)
         if rounds.has_reset or (after.x != x).any() or differ(before, rates):
             off = [*rounds.off, *off]
         return Y + self._note([*rounds.overtaken, *off]) - np.outer(rates, rounds.shift)
+
+
+def _next(at: Place, segment: Segment) -> Place:
+    """Return a place one step after the start of a segment, with the same derivatives."""
+    return replace(at, s=float(segment.s[:2][-1]), x=segment.x[:2][-1])
 
 
 def _place(rounds: Rounds, following: Segment) -> Place:

@@ -16,6 +16,7 @@ import numpy as np
 
 from hybridsim.analysis.variations.changes import Changed, Changes, Place
 from hybridsim.analysis.variations.tapes import tangent_tape
+from hybridsim.analysis.variations.zero_function import ZeroFunction
 from hybridsim.engine.lowering.reset_keys import added
 from hybridsim.engine.series.dual_numbers import Dual, differentiated, values_and_slopes, with_slopes
 from hybridsim.engine.system.system import System
@@ -53,11 +54,11 @@ def differ(one: np.ndarray, other: np.ndarray) -> bool:
     return bool((np.abs(one - other) > _SAME * (np.abs(one) + np.abs(other))).any())
 
 
-def off_zero(changes: Changes, at: Place) -> tuple[np.ndarray, list[OffZero]]:
-    """Return the derivatives, corrected by constraints, and a list of the functions at zero."""
+def off_zero(changes: Changes, at: Place) -> tuple[np.ndarray, list[OffZero], list[ZeroFunction]]:
+    """Return the derivatives, corrected by constraints, the functions at zero, and those of them without a rate."""
     sides = _Sides(changes, at)
     off = sides.surfaces()
-    return sides.at.Y, off + sides.guards()
+    return sides.at.Y, off + sides.guards(), sides.staying
 
 
 def limits_reached(changes: Changes, at: Place, components: Sequence[int]) -> list[OffZero]:
@@ -66,24 +67,29 @@ def limits_reached(changes: Changes, at: Place, components: Sequence[int]) -> li
     return [one for c in components for one in sides.limits(c)]
 
 
-def monitors_reached(changes: Changes, at: Place, later: Place) -> list[OffZero]:
-    """Return the monitors that are zero at the start and would fire after a small change of the start.
+def monitors_reached(
+    changes: Changes, at: Place, later: Place, numbers: Sequence[int]
+) -> tuple[list[OffZero], list[int]]:
+    """Return the monitors at zero that would fire after a small change, and the numbers of those that stay zero.
 
-    later : a later place; it gives the side if the rate at the start is zero.
+    later : a later place; it gives the side if the rate is zero. numbers : of the monitors to judge.
     """
     monitors = changes.system.model.monitors
-    numbers = tuple(range(len(monitors)))
-    if all(monitor.action == "record" for monitor in monitors):
-        return []
-    sides, off = _Sides(changes, at), []
-    for monitor, one, then in zip(
-        monitors, changes.of(at, (), numbers), changes.of(later, (), numbers), strict=True
+    numbers = tuple(k for k in numbers if monitors[k].action != "record")
+    if not numbers:
+        return [], []
+    sides, off, staying = _Sides(changes, at), [], []
+    for k, one, then in zip(
+        numbers, changes.of(at, (), numbers), changes.of(later, (), numbers), strict=True
     ):
+        if not one.is_zero:
+            continue
         rate = one.along(sides.here) or (0.0 if then.is_zero else then.value)
-        fires = rate != 0.0 and (monitor.direction == "both" or (monitor.direction == "up") == (rate > 0.0))
-        if monitor.action != "record" and one.is_zero and one.moves.any() and fires:
-            off.append(sides.off(f"monitor {monitor.name}", one, one.by * rate < 0.0, sides.here, 0.0))
-    return off
+        fires = rate != 0.0 and monitors[k].direction in ("both", "up" if rate > 0.0 else "down")
+        if one.moves.any() and fires:
+            off.append(sides.off(f"monitor {monitors[k].name}", one, one.by * rate < 0.0, sides.here, 0.0))
+        staying += [k] if rate == 0.0 else []
+    return off, staying
 
 
 class _Sides:
@@ -95,6 +101,7 @@ class _Sides:
             at.Y.shape[1], dtype=bool
         )  # directions with impulses of components that hold again
         self.here = self._rates(at.z)
+        self.staying: list[ZeroFunction] = []
 
     def guards(self) -> list[OffZero]:
         """Return the surfaces that are zero and have different rates on their two sides."""
@@ -110,8 +117,10 @@ class _Sides:
         found, before = self.changes.of(self.at, numbers), self.changes.of(self.before, numbers)
         off = []
         for (c, i, _), one, earlier in zip(guards_here, found, before, strict=True):
-            if one.is_zero and one.moves.any():
-                off += self._guard(c, i, one)
+            noted = self._guard(c, i, one) if one.is_zero and one.moves.any() else []
+            off += noted
+            if one.is_zero and one.along(self.here) == 0.0:
+                self._stays(c, i, np.any([other.moves for other in noted], axis=0) | np.zeros_like(one.moves))
             if one.is_zero and (earlier.moves & self.pushed).any():  # it may fire before holding is restored
                 for other in self._guard(c, i, earlier):
                     lost = (other.lost | other.more.any(axis=0)) & self.pushed
@@ -150,8 +159,12 @@ class _Sides:
             if self.at.z[c] != automaton.hold:
                 if one.is_zero:
                     at_limit.append(c)
+                    noted = one.moves & differ(above, below)
                     if differ(above, below):
                         passed.append((k, c, above, below))
+                    if one.along(self.here) == 0.0:
+                        here, there = int(self.at.z[c]), automaton.above + automaton.below - int(self.at.z[c])
+                        self.staying.append(ZeroFunction(automaton.name, c, here, there, noted, surface=k))
                 continue
             at_limit.append(c)
             comes_back = one.row @ (above - self.here) < 0.0 < one.row @ (below - self.here)
@@ -234,11 +247,36 @@ class _Sides:
             speed = back.along(there)
             if speed < 0.0 and not self._resets(c, int(z[c]), k, onward) and (back.by >= 0.0)[other].all():
                 return [self.off(name, back, other, there, speed)] if differ(there, self.here) else []
-            if speed == 0.0 and automaton.is_corner and self._is_smooth(z):
+            if speed == 0.0 and automaton.is_corner and not automaton.is_step:
                 return []
         if not numbers and tangent_tape(self.system, z).is_same(tangent_tape(self.system, self.at.z)):
+            if not self._are_alike(c, m, int(z[c])):
+                self.staying.append(ZeroFunction(name, c, m, int(z[c]), one.moves, gone=other))
             return []
         return [self.off(name, one, other, there, 0.0)]
+
+    def _stays(self, c: int, i: int, noted: np.ndarray) -> None:
+        """Store a guard that is zero without a rate, if a change may fire it later."""
+        automaton, m = self.system.automata[c], int(self.at.z[c])
+        choice = self.system.choose(c, m, i, self.at.s, self.at.x, self.at.p, self.at.z)
+        if choice < 0:
+            return
+        there = automaton.targets[m][i][choice]
+        back = [
+            automaton.guards[there][k]
+            for k, targets in enumerate(automaton.targets[there])
+            if automaton.is_corner and not automaton.is_step and m in targets
+        ]
+        if self._resets(c, m, i, choice) or not self._are_alike(c, m, there):
+            name = f"guard {automaton.guard_names[m][i]} of {automaton.name}"
+            number = automaton.guards[m][i]
+            self.staying.append(ZeroFunction(name, c, m, there, noted, number, back[0] if back else -1))
+
+    def _are_alike(self, c: int, m: int, other: int) -> bool:
+        """Return whether two modes of a component set the same values, and neither has a guard that leads elsewhere."""
+        modes = self.system.model.all_components()[c].modes
+        one, two = modes[m], modes[other]
+        return (one.der, one.set) == (two.der, two.set) and len(one.guards) == 1 and not two.guards
 
     def limits(self, c: int) -> list[OffZero]:
         """List the force limits that a component reaches exactly, in its holding mode or just before it."""
@@ -280,11 +318,6 @@ class _Sides:
         z = self.at.z.copy()
         z[c] = mode
         return z
-
-    def _is_smooth(self, z: np.ndarray) -> bool:
-        """Return whether the rates and their derivatives are equal in the modes `z` and in the modes of the run."""
-        one, other = (self.changes.flow(replace(self.at, z=modes)) for modes in (z, self.at.z))
-        return not any(differ(a, b) for a, b in zip(one, other, strict=True))
 
 
 def _are_opposite(one: np.ndarray, other: np.ndarray) -> bool:
