@@ -135,7 +135,8 @@ class SteadyState(Readable, Measures):
     def multipliers(self) -> np.ndarray:
         """Floquet multipliers, largest first. For an unforced orbit, the trivial multiplier 1 is left out.
 
-        Each stick phase of a contact reduces the rank by one, and makes one multiplier exactly zero.
+        Each stick phase of a contact reduces the rank by one, and makes one multiplier exactly zero. A motion along
+        which a guard or surface stays zero while its two sides part has none.
         """
         if not self.success:
             raise UsageError(
@@ -143,7 +144,13 @@ class SteadyState(Readable, Measures):
                 remedy="use `lyapunov` instead",
             )
         rates = rates_at_end(self.solution) if self._is_free else None
-        return multipliers(derivatives(self.solution, ()).by_start, rates)
+        found = derivatives(self.solution, ())
+        if found.warnings:
+            raise UsageError(
+                f"the motion has no multipliers: {found.warnings[0].partition(',')[0]}, and its two sides part later",
+                remedy="use other parameters, or hs.simulate from starts on both sides",
+            )
+        return multipliers(found.by_start, rates)
 
     @property
     def stable(self) -> bool:

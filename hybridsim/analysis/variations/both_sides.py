@@ -6,6 +6,7 @@ import numpy as np
 
 from hybridsim.analysis.variations.carried import Carrier
 from hybridsim.analysis.variations.directions import Carried, Directions
+from hybridsim.analysis.variations.off_zero import OffZero
 from hybridsim.errors import UsageError
 
 _AGREE = 1e-7  # of their sizes: derivatives on both sides that differ by less are equal
@@ -44,8 +45,8 @@ class OneSide:
         return found
 
     def differing(self) -> list[tuple[str, np.ndarray]]:
-        """Return an empty list, because a one-sided derivative is unique."""
-        return []
+        """Return the functions at zero whose two sides part later, each with a mask (M,) of directions."""
+        return [(_zero_text(one), one.moves) for one in self._carried.off if one.parts]
 
 
 class BothSides(OneSide):
@@ -122,10 +123,7 @@ class BothSides(OneSide):
 
     def differing(self) -> list[tuple[str, np.ndarray]]:
         differs = np.isnan(self.at_end()).any(axis=0) | np.isnan(self.of_times()[1]).any(axis=0)
-        parted = [
-            (f"at t = {one.t:.9g} {one.name} is exactly at its zero", one.moves & differs)
-            for one in self._carried.off
-        ]
+        parted = [(_zero_text(one), one.moves & differs) for one in self._carried.off]
         return [(name, mask) for name, mask in parted if mask.any()]
 
     def _lost(self, both: Carried) -> np.ndarray:
@@ -146,6 +144,10 @@ class BothSides(OneSide):
         one, other = sides[:, :count], -sides[:, count:]
         apart = np.abs(one - other) > _AGREE * (np.abs(one) + np.abs(other)) + least
         return np.where(apart | lost, np.nan, 0.5 * (one + other))
+
+
+def _zero_text(one: OffZero) -> str:
+    return f"at t = {one.t:.9g} {one.name} is exactly at its zero"
 
 
 def _shift(carried: Carried, number: int) -> np.ndarray:

@@ -29,6 +29,7 @@ class OffZero(NamedTuple):
 
     moves : mask (M,) of these directions. lost : mask (M,) of those from whose side the run does not return.
     more : addition to the derivatives (n, M) of the states on the other side; zero elsewhere.
+    parts : whether a run on the other side is known to part from the run only later.
     """
 
     t: float
@@ -36,6 +37,7 @@ class OffZero(NamedTuple):
     moves: np.ndarray
     lost: np.ndarray
     more: np.ndarray
+    parts: bool = False
 
 
 def rates_of(system: System, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> np.ndarray:
@@ -162,7 +164,7 @@ class _Sides:
                     noted = one.moves & differ(above, below)
                     if differ(above, below):
                         passed.append((k, c, above, below))
-                    if one.along(self.here) == 0.0:
+                    if one.along(above) == one.along(below) == 0.0:  # else it holds, see `limits`
                         here, there = int(self.at.z[c]), automaton.above + automaton.below - int(self.at.z[c])
                         self.staying.append(ZeroFunction(automaton.name, c, here, there, noted, surface=k))
                 continue

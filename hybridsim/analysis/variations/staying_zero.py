@@ -179,7 +179,9 @@ class Follower:
         if not moves.any():
             return []
         none = np.zeros((self._system.n, len(moves)))
-        return [OffZero(float(self._segment.start), zero.name, moves, lost, none if more is None else more)]
+        return [
+            OffZero(float(self._segment.start), zero.name, moves, lost, none if more is None else more, True)
+        ]
 
 
 def resets_parted(
@@ -209,7 +211,7 @@ def resets_parted(
         parted = _differ(slopes, other_slopes).any(axis=0) | _differ(values, others).any()
         if (moves & parted).any():
             t, none = at.origin + at.s, np.zeros(at.Y.shape)
-            off.append(OffZero(t, seen.name, moves & parted, other & parted, none))
+            off.append(OffZero(t, seen.name, moves & parted, other & parted, none, True))
     return off
 
 
