@@ -28,17 +28,10 @@ from hybridsim.analysis.variations.off_zero import (
     beyond,
     differ,
     limits_reached,
-    monitors_reached,
     off_zero,
     rates_of,
 )
-from hybridsim.analysis.variations.rounds import (
-    Rounds,
-    batches,
-    component_of,
-    is_knot,
-    is_recorded,
-)
+from hybridsim.analysis.variations.rounds import Rounds, batches, component_of, is_knot, is_recorded
 from hybridsim.analysis.variations.segment_events import (
     Last,
     SegmentEvents,
@@ -47,10 +40,10 @@ from hybridsim.analysis.variations.segment_events import (
     time_rounding,
 )
 from hybridsim.analysis.variations.sizes import sizes
-from hybridsim.analysis.variations.staying_zero import Follower, resets_parted
 from hybridsim.analysis.variations.values.table_slopes import TableValue
 from hybridsim.analysis.variations.values.vector_slopes import VectorSlopes
-from hybridsim.analysis.variations.zero_function import ZeroFunction
+from hybridsim.analysis.variations.zeros.monitors import monitors_reached
+from hybridsim.analysis.variations.zeros.staying import Staying
 from hybridsim.engine.native.kernels import Precompiled
 from hybridsim.engine.record.segments import Segment
 from hybridsim.engine.system.system import System
@@ -90,15 +83,15 @@ class Carrier:
         Y, Yd = directions.x.copy(), directions.discrete.copy()
         self._changes = Changes(self.system, self._scale, self.own_sizes(directions), G, self._vector)
         self._off: list[OffZero] = []
-        self._zeros: list[ZeroFunction] = []
+        self._staying = Staying()
         event_times, last = EventTimes(self._changes), None
         times: list[tuple[float, np.ndarray]] = []
         starts: list[tuple[np.ndarray, np.ndarray]] = []
         shifts = [np.zeros(G.shape[1])]
         Y, Yd = self._started(self.solution._segments[0], Y, Yd, G, event_times)
         self._flow.prepare(Yd, G)
-        Y = self._followed(0, self.solution._segments[0], Y, Yd, G)
-        found = None if sided or self._zeros or self._monitors else self._ordinary(Y, Yd, G)
+        Y = self._followed(0, Y, Yd, G, np.zeros(G.shape[1]))
+        found = None if sided or self._staying else self._ordinary(Y, Yd, G)
         if found is not None:
             return found
         all_segment_events = list(segment_events_of(self.solution))
@@ -122,7 +115,8 @@ class Carrier:
             if self._is_end(following.segment) and last is None:
                 last = Last(segment, Y, Yd, behind[2], segment_events.happened)
             Y, Yd, shift = behind
-            Y = self._followed(number + 1, following.segment, Y, Yd, G)
+            if number + 1 < len(self.solution._segments):
+                Y = self._followed(number + 1, Y, Yd, G, shift)
             shifts.append(np.where(self._moves(shift), shift, 0.0))
             if any(one.kind != "corner" for one in segment_events.happened):
                 times.append((float(following.segment.start), shift))
@@ -240,9 +234,8 @@ class Carrier:
             rounds.at_appointment(segment.start, batch)
         before = rates_of(self.system, float(segment.s[0]), x, segment.p, z)
         at = _place(rounds, segment)
-        off, self._monitors = monitors_reached(
-            self._changes, at, _next(at, segment), range(len(self.system.model.monitors))
-        )
+        numbers = range(len(self.system.model.monitors))
+        off, self._staying.monitors = monitors_reached(self._changes, at, segment, numbers)
         for name, by in self._vector.knots(segment.start):
             begins = by @ G  # a knot that moves off the start to a later time changes the run
             off.append(OffZero(at.origin + at.s, name, begins != 0.0, begins > 0.0, np.zeros(Y.shape)))
@@ -262,22 +255,15 @@ class Carrier:
         return Rounds(self.system, *before, Y, Yd, self._changes, shift, large, loose, is_start, self._sided)
 
     def _followed(
-        self, number: int, segment: Segment, Y: np.ndarray, Yd: np.ndarray, G: np.ndarray
+        self, number: int, Y: np.ndarray, Yd: np.ndarray, G: np.ndarray, shift: np.ndarray
     ) -> np.ndarray:
         """Return the derivatives at the start of a segment, corrected by functions that stay zero or leave it there."""
-        if not (self._zeros or self._monitors) or len(segment.s) < 2:
-            return Y
-        follower = Follower(
-            self._changes, segment, Yd, lambda stops: self._flow.over(number, Y, Yd, G, stops)
-        )
-        followed = [follower.follow(one) for one in self._zeros]
-        self._zeros = [one for one, _ in followed if one is not None]
-        off = [one for _, found in followed for one in found]
-        if number > 0:
-            at = follower.at_start()
-            fired, self._monitors = monitors_reached(self._changes, at, _next(at, segment), self._monitors)
-            off += fired
-        return Y + self._note(off)
+
+        def over(stops: np.ndarray) -> np.ndarray:
+            return self._flow.over(number, Y, Yd, G, stops)
+
+        segment = self.solution._segments[number]
+        return Y + self._note(self._staying.follow(self._changes, segment, Yd, shift, over))
 
     # -- at events ------------------------------------------------------------------------------------------
 
@@ -300,30 +286,17 @@ class Carrier:
         before = rates_of(system, s, x, segment.p, segment.z)
         moved = np.outer(before, shift)
         large = np.maximum(np.abs(Y), np.abs(moved))
-        groups = batches(happened)
 
         def ran(z: np.ndarray) -> Rounds:
             rounds = self._rounds((x, system.discrete(segment.p), z), Y + moved, Yd, shift, large)
-            for k, batch in enumerate(groups):
-                is_due = (
-                    any(one.kind == "scheduled" for one in batch)
-                    or batch[0].instant.minus(segment.end) > 0.0  # the limit of a series
-                    or (k == len(groups) - 1 and is_knot(system, following.start))
-                )
-                if is_due:
-                    rounds.at_appointment(following.start, batch)
-                else:
-                    rounds.at_end(segment, batch)
+            rounds.run(segment, following.start, happened)
             return rounds
 
         rounds = ran(segment.z)
-        if rounds.has_reset and self._zeros:
-            at = Place(s, float(segment.origin), x, segment.p, segment.z, Y, Yd, np.zeros_like(shift), large)
-            self._note(resets_parted(self._changes, self._zeros, at, rounds, ran))
+        at = Place(s, float(segment.origin), x, segment.p, segment.z, Y, Yd, np.zeros_like(shift), large)
+        self._note(self._staying.at_resets(self._changes, at, rounds, ran))
         Yd, immediate = rounds.Yd, rounds.Y
-        if self._is_end(
-            following
-        ):  # a state that a jump moves off its surface has no time to return, and no guard fires
+        if self._is_end(following):  # a state off its surface has no time to return, and no guard fires
             later = self._moves(rounds.shift - shift)
             self._note([one._replace(lost=one.lost | later) for one in rounds.off])
             rounds.off.clear()
@@ -334,11 +307,8 @@ class Carrier:
                 component_of(system, one)[0] for one in happened if one.kind not in ("monitor", "scheduled")
             }
             surfaces = [c for c in sorted(changed) if system.automata[c].below >= 0]  # not gaps
-            more = (
-                self._note(limits_reached(self._changes, _place(rounds, following), surfaces))
-                if surfaces
-                else 0.0
-            )
+            place = _place(rounds, following)
+            more = self._note(limits_reached(self._changes, place, surfaces)) if surfaces else 0.0
             Y = rounds.Y + more - np.outer(self._rates_at_start(following), rounds.shift)
         Y = self._flow.projected(following, Y, Yd, G)
         return np.where(self._is_end(following) & ~self._moves(shift), immediate, Y), Yd, shift
@@ -353,16 +323,11 @@ class Carrier:
         """
         after = _place(rounds, following)
         Y, off, zeros = off_zero(self._changes, after)
-        self._zeros = [one for one in self._zeros if one.gone is not None] + zeros
+        self._staying.settle(zeros)
         rates = self._rates_at_start(following)
         if rounds.has_reset or (after.x != x).any() or differ(before, rates):
             off = [*rounds.off, *off]
         return Y + self._note([*rounds.overtaken, *off]) - np.outer(rates, rounds.shift)
-
-
-def _next(at: Place, segment: Segment) -> Place:
-    """Return a place one step after the start of a segment, with the same derivatives."""
-    return replace(at, s=float(segment.s[:2][-1]), x=segment.x[:2][-1])
 
 
 def _place(rounds: Rounds, following: Segment) -> Place:

@@ -10,13 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from hybridsim.analysis.variations.changes import Changed, Changes, Place
 from hybridsim.analysis.variations.tapes import tangent_tape
-from hybridsim.analysis.variations.zero_function import ZeroFunction
+from hybridsim.analysis.variations.zeros.zero_function import ZeroFunction, are_alike
 from hybridsim.engine.lowering.reset_keys import added
 from hybridsim.engine.series.dual_numbers import Dual, differentiated, values_and_slopes, with_slopes
 from hybridsim.engine.system.system import System
@@ -67,31 +67,6 @@ def limits_reached(changes: Changes, at: Place, components: Sequence[int]) -> li
     """Return the force limits that are reached exactly, with no margin, when a component changes its mode."""
     sides = _Sides(changes, at)
     return [one for c in components for one in sides.limits(c)]
-
-
-def monitors_reached(
-    changes: Changes, at: Place, later: Place, numbers: Sequence[int]
-) -> tuple[list[OffZero], list[int]]:
-    """Return the monitors at zero that would fire after a small change, and the numbers of those that stay zero.
-
-    later : a later place; it gives the side if the rate is zero. numbers : of the monitors to judge.
-    """
-    monitors = changes.system.model.monitors
-    numbers = tuple(k for k in numbers if monitors[k].action != "record")
-    if not numbers:
-        return [], []
-    sides, off, staying = _Sides(changes, at), [], []
-    for k, one, then in zip(
-        numbers, changes.of(at, (), numbers), changes.of(later, (), numbers), strict=True
-    ):
-        if not one.is_zero:
-            continue
-        rate = one.along(sides.here) or (0.0 if then.is_zero else then.value)
-        fires = rate != 0.0 and monitors[k].direction in ("both", "up" if rate > 0.0 else "down")
-        if one.moves.any() and fires:
-            off.append(sides.off(f"monitor {monitors[k].name}", one, one.by * rate < 0.0, sides.here, 0.0))
-        staying += [k] if rate == 0.0 else []
-    return off, staying
 
 
 class _Sides:
@@ -145,16 +120,8 @@ class _Sides:
         for _, c in chosen:
             free[c] = self.system.automata[c].above
         found = self.changes.of(replace(self.at, z=free), surfaces=tuple(k for k, _ in chosen))
-        off, rows, pushes, moved, at_limit, passed, holding, loose = (
-            list[OffZero](),
-            [],
-            [],
-            [],
-            [],
-            [],
-            [],
-            [],
-        )
+        off: list[OffZero] = []
+        rows, pushes, moved, at_limit, passed, holding, loose = (list[Any]() for _ in range(7))
         for (k, c), one in zip(chosen, found, strict=True):
             automaton = self.system.automata[c]
             above, below = (self._rates(self._with(c, mode)) for mode in (automaton.above, automaton.below))
@@ -252,7 +219,7 @@ class _Sides:
             if speed == 0.0 and automaton.is_corner and not automaton.is_step:
                 return []
         if not numbers and tangent_tape(self.system, z).is_same(tangent_tape(self.system, self.at.z)):
-            if not self._are_alike(c, m, int(z[c])):
+            if not are_alike(self.system, c, m, int(z[c])):
                 self.staying.append(ZeroFunction(name, c, m, int(z[c]), one.moves, gone=other))
             return []
         return [self.off(name, one, other, there, 0.0)]
@@ -269,16 +236,10 @@ class _Sides:
             for k, targets in enumerate(automaton.targets[there])
             if automaton.is_corner and not automaton.is_step and m in targets
         ]
-        if self._resets(c, m, i, choice) or not self._are_alike(c, m, there):
+        if self._resets(c, m, i, choice) or not are_alike(self.system, c, m, there):
             name = f"guard {automaton.guard_names[m][i]} of {automaton.name}"
             number = automaton.guards[m][i]
             self.staying.append(ZeroFunction(name, c, m, there, noted, number, back[0] if back else -1))
-
-    def _are_alike(self, c: int, m: int, other: int) -> bool:
-        """Return whether two modes of a component set the same values, and neither has a guard that leads elsewhere."""
-        modes = self.system.model.all_components()[c].modes
-        one, two = modes[m], modes[other]
-        return (one.der, one.set) == (two.der, two.set) and len(one.guards) == 1 and not two.guards
 
     def limits(self, c: int) -> list[OffZero]:
         """List the force limits that a component reaches exactly, in its holding mode or just before it."""

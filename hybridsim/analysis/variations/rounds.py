@@ -12,19 +12,15 @@ import numpy as np
 from hybridsim.analysis.variations.changes import Changes, Place
 from hybridsim.analysis.variations.impacts import Impacts
 from hybridsim.analysis.variations.off_zero import OffZero, off_zero, rates_of
+from hybridsim.analysis.variations.zeros.reset_corners import ResetCorners
 from hybridsim.engine.events.zeno.limits import LIMIT
-from hybridsim.engine.lowering.reset_keys import added, declared_reset
+from hybridsim.engine.lowering.reset_keys import added
 from hybridsim.engine.record.segments import Occurrence, Segment
-from hybridsim.engine.series.bounded import UNIT
 from hybridsim.engine.series.dual_numbers import Dual, differentiated, values_and_slopes, with_slopes
 from hybridsim.engine.system.instant import Instant
 from hybridsim.engine.system.system import System
-from hybridsim.model.meanings import Meanings
-from hybridsim.model.smoothing.nonsmooth import has_word
 
 _ALIKE = 1e-7  # relative; guards fire together if their delays agree
-_BESIDE = 2.0**-24  # of a quantity's own size: a step to both sides of a point, in search of a corner there
-_BENT = 2.0**-10  # of the changes on both sides: a larger difference between them is a corner
 
 
 def is_knot(system: System, instant: Instant) -> bool:
@@ -92,14 +88,22 @@ class Rounds:
         self._later: list[np.ndarray] = []
         self._reset = differentiated(system.code.module.reset)
         self._impacts = Impacts(system) if system.is_unilateral.any() else None
-        model = system.model
-        self._meanings = Meanings(model)
-        self._crooked = {name for name, expr in model.definitions if has_word(expr)}
+        self._corners = ResetCorners(system, self._reset, changes.own)
         self._names = [*system.names, *(v.name for v in system.model.discrete)]
 
-    def at_end(self, segment: Segment, happened: Sequence[Occurrence]) -> None:
-        """Apply the resets of events that were located along a segment."""
-        self._run(happened, segment.p, float(segment.s[-1]), float(segment.origin))
+    def run(self, segment: Segment, following: Instant, happened: Sequence[Occurrence]) -> None:
+        """Apply the resets of the events at the end of a segment; the next segment starts at the time `following`."""
+        groups = batches(happened)
+        for k, batch in enumerate(groups):
+            is_due = (
+                any(one.kind == "scheduled" for one in batch)
+                or batch[0].instant.minus(segment.end) > 0.0  # the limit of a series
+                or (k == len(groups) - 1 and is_knot(self.system, following))
+            )
+            if is_due:
+                self.at_appointment(following, batch)
+            else:
+                self._run(batch, segment.p, float(segment.s[-1]), float(segment.origin))
 
     def at_appointment(self, instant: Instant, happened: Sequence[Occurrence]) -> None:
         """Apply the resets of scheduled events, with the values that inputs have just after this instant."""
@@ -211,8 +215,10 @@ class Rounds:
                 out = list(before)
                 z = np.array([*self._reading(), system.resets[part][0]])
                 self._reset(Dual(s, self.shift), x, lifted, z, out)
-                if self._may_have_corners(key):
-                    self._note_corners(one, (Dual(s, self.shift), x, lifted), z, before, origin + s)
+                corners = self._corners.beside(key, (Dual(s, self.shift), x, lifted), z, before)
+                if corners.any():
+                    what, none = f"a corner in a reset of {one.component}", np.zeros(self.Y.shape)
+                    self.off.append(OffZero(origin + s, what, corners, corners, none))
                 for name in names:
                     k = self._names.index(name)
                     after[k] = out[k] if part is key else after[k] + out[k]
@@ -225,52 +231,6 @@ class Rounds:
         self._has_moved = True
         self.x, self.d, self.Y, self.Yd = found[:n], found[n:], slopes[:n], slopes[n:]
         self.z = modes
-
-    def _may_have_corners(self, key: tuple[Any, ...]) -> bool:
-        """Return whether a reset contains a function such as abs, min or max."""
-        reset = declared_reset(self.system.model, key)
-        names = {name for expr in reset.values() for name in expr.names}
-        return any(map(has_word, reset.values())) or bool(self._meanings.depended_on(names) & self._crooked)
-
-    def _note_corners(
-        self,
-        one: Occurrence,
-        arguments: tuple[Dual, list[Dual], list[Any]],
-        z: np.ndarray,
-        before: list[Any],
-        t: float,
-    ) -> None:
-        """Store the directions in which a reset has a corner or jumps, such as abs(v) at v = 0."""
-        width = self.Y.shape[1]
-        corners, here = np.zeros(width, dtype=bool), self._reset_beside(arguments, z, before, 0, 0.0)
-        for j in range(width):
-            step = _BESIDE * float(self._changes.own[j])
-            up, down = (
-                self._reset_beside(arguments, z, before, j, sign * step) - here for sign in (1.0, -1.0)
-            )
-            changes = np.abs(up) + np.abs(down)
-            corners[j] = (np.abs(up + down) > _BENT * changes + 64.0 * UNIT * np.abs(here)).any()
-        if corners.any():
-            name = f"a corner in a reset of {one.component}"
-            self.off.append(OffZero(t, name, corners, corners, np.zeros(self.Y.shape)))
-
-    def _reset_beside(
-        self,
-        arguments: tuple[Dual, list[Dual], list[Any]],
-        z: np.ndarray,
-        before: list[Any],
-        j: int,
-        step: float,
-    ) -> np.ndarray:
-        """Return the values that a reset sets after a step in direction j."""
-
-        def moved(number: Any) -> float:
-            return float(number.value + step * number.slope[j]) if isinstance(number, Dual) else float(number)
-
-        s, x, lifted = arguments
-        out = [moved(one) for one in before]
-        self._reset(moved(s), [moved(one) for one in x], [moved(one) for one in lifted], z, out)
-        return np.array(out)
 
     def _closing(self, one: Occurrence) -> int:
         """Return the component of a unilateral contact whose gap closes with an impact, or -1."""

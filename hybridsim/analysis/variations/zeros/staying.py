@@ -11,7 +11,8 @@ of first order. For p = k the states change by -D dg/G. For p < k there is no de
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -20,29 +21,74 @@ from hybridsim.analysis.variations.changes import EXACT, Changed, Changes, Place
 from hybridsim.analysis.variations.off_zero import OffZero, rates_of
 from hybridsim.analysis.variations.rounds import Rounds
 from hybridsim.analysis.variations.tapes import tangent_tape
-from hybridsim.analysis.variations.zero_function import ZeroFunction
+from hybridsim.analysis.variations.zeros.monitors import monitors_reached
+from hybridsim.analysis.variations.zeros.zero_function import ZeroFunction
 from hybridsim.engine.record.segments import Segment
 from hybridsim.engine.series.bounded import ORDER, UNIT
 from hybridsim.engine.system.system import System
 
 _SAME = 1e-9  # of their terms: rates, or effects of a change, that differ by less are equal on both sides
-_PLACES = np.array(
+_FRACTIONS = np.array(
     [0.0, 0.013, 0.11, 0.29, 0.53, 0.71, 0.89, 1.0]
 )  # of a segment; irregular, to miss no difference
 _EARLY = 1e-3  # of a segment: time after its start at which the order of a change is measured
 
 
+Over = Callable[[np.ndarray], np.ndarray]
+"""The type of derivatives (k, n, M) of the states at local times (k,) of a segment."""
+
+
+class Staying:
+    """The functions, and the numbers of the monitors, that are zero without a rate at an instant of a run."""
+
+    def __init__(self) -> None:
+        self.zeros: list[ZeroFunction] = []
+        self.monitors: list[int] = []
+
+    def __bool__(self) -> bool:
+        return bool(self.zeros or self.monitors)
+
+    def settle(self, zeros: list[ZeroFunction]) -> None:
+        """Replace the functions after an event with a jump, except those with directions that left for good."""
+        self.zeros = [one for one in self.zeros if one.gone is not None] + zeros
+
+    def follow(
+        self, changes: Changes, segment: Segment, Yd: np.ndarray, shift: np.ndarray, over: Over
+    ) -> list[OffZero]:
+        """Follow everything along a segment, and return the effects on the derivatives."""
+        if not self or len(segment.s) < 2:
+            return []
+        follower = Follower(changes, segment, Yd, shift, over)
+        followed = [follower.follow(one) for one in self.zeros]
+        self.zeros = [one for one, _ in followed if one is not None]
+        off, self.monitors = monitors_reached(changes, follower.at_start(), segment, self.monitors)
+        return [one for _, found in followed for one in found] + off
+
+    def at_resets(
+        self, changes: Changes, at: Place, rounds: Rounds, ran: Callable[[np.ndarray], Rounds]
+    ) -> list[OffZero]:
+        """Return the functions on whose other side the resets of an instant have other results.
+
+        at : the place just before the instant. rounds : its resets. ran : repeats them in other modes before it.
+        """
+        return (
+            [one for zero in self.zeros for one in _parted_by_resets(changes, zero, at, rounds, ran)]
+            if rounds.has_reset
+            else []
+        )
+
+
 class Follower:
     """Follows functions at zero along one segment of a run.
 
-    over : returns the derivatives (k, n, M) of the states at local times (k,).
+    over : returns the derivatives (k, n, M) of the states at local times (k,). shift (M,) : of the time of its start.
     """
 
     def __init__(
-        self, changes: Changes, segment: Segment, Yd: np.ndarray, over: Callable[[np.ndarray], np.ndarray]
+        self, changes: Changes, segment: Segment, Yd: np.ndarray, shift: np.ndarray, over: Over
     ) -> None:
         self._changes, self._system, self._segment, self._over = changes, changes.system, segment, over
-        self._Yd = Yd
+        self._Yd, self._shift = Yd, shift
 
     def follow(self, zero: ZeroFunction) -> tuple[ZeroFunction | None, list[OffZero]]:
         """Return the function if it is still to be followed after the segment, and its effects on the derivatives."""
@@ -52,12 +98,12 @@ class Follower:
         seen = zero.seen_from(mode)
         if seen is None:
             return None, []
-        places = list(self._places(_PLACES))
-        found = [_value(self._changes, seen, at) for at in places]
+        points = list(self._along(_FRACTIONS))
+        found = [_value(self._changes, seen, at) for at in points]
         if not all(one.is_zero for one in found):
-            return None, self._leaving(seen, places[0], found[0])
+            return None, self._leaving(seen, points[0], found[0])
         moves, lost = np.zeros(width, dtype=bool), np.zeros(width, dtype=bool)
-        for at, one in zip(places, found, strict=True):
+        for at, one in zip(points, found, strict=True):
             if not (one.moves & ~seen.noted).any():
                 continue
             parted = one.moves & ~seen.noted & self._parted(seen, at)
@@ -71,7 +117,7 @@ class Follower:
         if mode == zero.there:
             return None, []
         parted = np.full(len(zero.gone), mode != zero.here)
-        for at in self._places(_PLACES):
+        for at in self._along(_FRACTIONS):
             parted |= self._parted(zero, at)
         parted &= zero.gone
         rest = zero.gone & ~parted
@@ -123,7 +169,8 @@ class Follower:
         self, zero: ZeroFunction, first: Changed, order: int, parted: int
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return the directions (M,) that move the function by a lower order of time only, and those without return."""
-        one, two = (_value(self._changes, zero, at) for at in self._places(np.array([_EARLY, 2.0 * _EARLY])))
+        early = np.array([_EARLY, 2.0 * _EARLY])  # after the start, which a change may move
+        one, two = (_value(self._changes, zero, self._moving(at)) for at in self._along(early))
         moved = one.moves & ~first.moves & ~zero.noted
         with np.errstate(divide="ignore", invalid="ignore"):
             lowest = np.where(moved, np.round(np.log2(two.by / one.by)), math.inf)
@@ -159,15 +206,20 @@ class Follower:
 
     def at_start(self) -> Place:
         """Return the place at the start of the segment."""
-        return next(self._places(np.zeros(1)))
+        return next(self._along(np.zeros(1)))
 
-    def _places(self, fractions: np.ndarray) -> Iterator[Place]:
+    def _along(self, fractions: np.ndarray) -> Iterator[Place]:
         segment, Yd = self._segment, self._Yd
         begin, end = float(segment.s[0]), float(segment.s[-1])
         stops = begin + fractions * (end - begin)
         fixed = np.zeros(self._changes.G.shape[1])
         for s, x, Y in zip(stops.tolist(), segment.dense(stops), self._over(stops), strict=True):
             yield Place(s, float(segment.origin), x, segment.p, segment.z, Y, Yd, fixed, np.abs(Y))
+
+    def _moving(self, at: Place) -> Place:
+        """Return a place that moves with the start of the segment."""
+        rates = rates_of(self._system, at.s, at.x, at.p, at.z)
+        return replace(at, Y=at.Y + np.outer(rates, self._shift), shift=self._shift)
 
     def _series(self, at: Place, z: np.ndarray) -> Any:
         error = 4.0 * UNIT * np.abs(self._segment.x).max(axis=0)
@@ -184,35 +236,28 @@ class Follower:
         ]
 
 
-def resets_parted(
-    changes: Changes,
-    zeros: Sequence[ZeroFunction],
-    at: Place,
-    rounds: Rounds,
-    ran: Callable[[np.ndarray], Rounds],
+def _parted_by_resets(
+    changes: Changes, zero: ZeroFunction, at: Place, rounds: Rounds, ran: Callable[[np.ndarray], Rounds]
 ) -> list[OffZero]:
-    """Return the functions at zero on whose other side the resets of an instant have other results.
-
-    at : the place just before the instant. rounds : its resets. ran : repeats them in other modes before the instant.
-    """
-    off = []
-    for zero in zeros:
-        seen = zero if zero.gone is not None else zero.seen_from(int(at.z[zero.c]))
-        if seen is None:
-            continue
-        moves = other = seen.gone
-        if moves is None or other is None:
-            one = _value(changes, seen, at)
-            moves = one.moves & ~seen.noted
-            other = moves & (_side(changes.system, seen) * one.by < 0.0)
-        beyond = ran(_other_side(seen, at))
-        pairs = [(np.concatenate([r.x, r.d]), np.concatenate([r.Y, r.Yd])) for r in (rounds, beyond)]
-        (values, slopes), (others, other_slopes) = pairs
-        parted = _differ(slopes, other_slopes).any(axis=0) | _differ(values, others).any()
-        if (moves & parted).any():
-            t, none = at.origin + at.s, np.zeros(at.Y.shape)
-            off.append(OffZero(t, seen.name, moves & parted, other & parted, none, True))
-    return off
+    seen = zero if zero.gone is not None else zero.seen_from(int(at.z[zero.c]))
+    if seen is None:
+        return []
+    moves = other = seen.gone
+    if moves is None or other is None:
+        one = _value(changes, seen, at)
+        moves = one.moves & ~seen.noted
+        other = moves & (_side(changes.system, seen) * one.by < 0.0)
+    if not moves.any():
+        return []
+    beyond = ran(_other_side(seen, at))
+    parted = np.array(
+        [_differ(np.concatenate([rounds.x, rounds.d]), np.concatenate([beyond.x, beyond.d])).any()]
+    )
+    parted = parted | _differ(rounds.Y, beyond.Y).any(axis=0) | _differ(rounds.Yd, beyond.Yd).any(axis=0)
+    if not (moves & parted).any():
+        return []
+    none = np.zeros(at.Y.shape)
+    return [OffZero(at.origin + at.s, seen.name, moves & parted, other & parted, none, True)]
 
 
 def _differ(one: np.ndarray, other: np.ndarray) -> np.ndarray:

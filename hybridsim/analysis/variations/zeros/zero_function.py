@@ -6,6 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hybridsim.engine.system.system import System
+
 
 class ZeroFunction(NamedTuple):
     """A guard or surface of component `c` that is zero without a rate, in the mode `here`.
@@ -32,3 +34,10 @@ class ZeroFunction(NamedTuple):
         if mode != self.there or (self.surface < 0 and self.back < 0):
             return None
         return self._replace(here=self.there, there=self.here, guard=self.back, back=self.guard)
+
+
+def are_alike(system: System, c: int, mode: int, other: int) -> bool:
+    """Return whether two modes of a component set the same values, and neither has a guard that leads elsewhere."""
+    modes = system.model.all_components()[c].modes
+    one, two = modes[mode], modes[other]
+    return (one.der, one.set) == (two.der, two.set) and len(one.guards) == 1 and not two.guards

@@ -1,0 +1,1 @@
+"""This package follows functions that stay zero along a run, and finds corners in resets."""
