@@ -57,7 +57,7 @@ def to_ivp(
     Raises
     ------
     UsageError
-        For an unknown component or mode, or a contact without a mode.
+        For an unknown component or mode, a contact without a mode, or gaps that are never zero together.
 
     Notes
     -----
@@ -84,6 +84,7 @@ def to_ivp(
     announce_compilation()
     system = System(model, as_written=True)
     modes = _modes(system, z)
+    _refuse_dependent(system, modes)
     discrete = np.array([model.discrete_values()[d.name] for d in model.discrete], dtype=float)
 
     tables = np.flatnonzero(system.is_corner).tolist()
@@ -154,3 +155,30 @@ def _modes(system: Any, declared: Mapping[str, str] | None) -> np.ndarray:
         else:
             modes.append(known_mode(mode, automaton.modes, "z", automaton.name))
     return np.array(modes, dtype=np.int64)
+
+
+def _refuse_dependent(system: Any, z: np.ndarray) -> None:
+    """Raise an error if the modes `z` keep gaps at zero of which one follows from the others."""
+    from hybridsim.engine.system.instant import Instant
+    from hybridsim.engine.system.tangents import TangentTape
+
+    free, held = z.copy(), []
+    for k, c in enumerate(system.surface_of):
+        automaton = system.automata[c]
+        if c in system.projected and z[c] == automaton.hold:
+            held.append(k)
+            free[c] = automaton.above  # holding modes replace the states of their gaps
+    if len(held) < 2:
+        return
+    start = system.start_state({})
+    places = np.array([start, start + 0.5 + 0.3 * np.sin(np.arange(1.0, 1.0 + system.n))])
+    p = system.vector(Instant(0.0), system.discrete_start)
+    tape = TangentTape(system, free, surfaces=tuple(held))
+    rows = tape(np.zeros(2), places, p, np.eye(system.n + 1 + len(p), system.n)).slopes[:, system.n :]
+    rows = rows[np.isfinite(rows).all(axis=(1, 2))]
+    if len(rows) and max(np.linalg.matrix_rank(one) for one in rows) < len(held):
+        names = ", ".join(system.automata[system.surface_of[k]].name for k in held)
+        raise UsageError(
+            f"`z` holds {names} at once, but these gaps depend on each other and cannot all be kept at zero",
+            remedy="open one of them in `z`",
+        )
