@@ -171,10 +171,10 @@ def _refuse_dependent(system: Any, z: np.ndarray) -> None:
     if len(held) < 2:
         return
     start = system.start_state({})
-    places = np.array([start, start + 0.5 + 0.3 * np.sin(np.arange(1.0, 1.0 + system.n))])
+    points = np.array([start, start + 0.5 + 0.3 * np.sin(np.arange(1.0, 1.0 + system.n))])
     p = system.vector(Instant(0.0), system.discrete_start)
     tape = TangentTape(system, free, surfaces=tuple(held))
-    rows = tape(np.zeros(2), places, p, np.eye(system.n + 1 + len(p), system.n)).slopes[:, system.n :]
+    rows = tape(np.zeros(2), points, p, np.eye(system.n + 1 + len(p), system.n)).slopes[:, system.n :]
     rows = rows[np.isfinite(rows).all(axis=(1, 2))]
     if len(rows) and max(np.linalg.matrix_rank(one) for one in rows) < len(held):
         names = ", ".join(system.automata[system.surface_of[k]].name for k in held)
