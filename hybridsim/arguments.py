@@ -206,7 +206,7 @@ def two_numbers(value: Any, argument: str, remedy: str, but: str = "") -> tuple[
 
 
 def start_values(model: Model, x0: Any, keyword: str = "x0") -> tuple[dict[str, float], Model]:
-    """Return initial values by name, and the model with the given discrete states; `keyword` names `x0`."""
+    """Return initial values by name, and the model with the discrete states of `x0`; `keyword` names `x0` in errors."""
     if x0 is None:
         return {}, model
     names = [s.name for s in model.states]

@@ -210,12 +210,12 @@ def _refuse_lacking(method: Integrator, model: Model, system: System, span: tupl
             required = [other for other, is_required in needs.items() if is_required()]
             # exclude methods for linear models, since nonlinearity is only checked later
             able = [one.name for one in list_integrators() if not {"nonlinear", *required} & one.lacks.keys()]
-            such = (
+            suggestion = (
                 f"use an integrator that supports it, such as {', '.join(able[:3])}"
                 if able
                 else "no integrator supports the whole model"
             )
             raise UsageError(
                 f"{method.name} cannot run model '{model.name}': {method.lacks[capability]}",
-                remedy=f"{such}; hs.list_integrators() lists all limitations",
+                remedy=f"{suggestion}; hs.list_integrators() lists all limitations",
             )

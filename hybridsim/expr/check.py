@@ -66,9 +66,7 @@ class _Checker:
         """Check a node whose value must be a number, and return whether it is constant."""
         constant, boolean = self.any(node)
         if boolean:
-            raise self.fail(
-                node, "a number is needed here, but this is a condition", "write '1 if ... else 0'"
-            )
+            raise self.fail(node, "this part must be a number, but is a condition", "write '1 if ... else 0'")
         return constant
 
     def truth(self, node: ast.expr) -> bool:
@@ -77,7 +75,7 @@ class _Checker:
         if not boolean:
             raise self.fail(
                 node,
-                "a condition is needed here, but this is a number",
+                "this part must be a condition, but is a number",
                 "write a comparison, such as 'x > 0'",
             )
         return constant

@@ -195,10 +195,10 @@ def load_law(name_or_path: str | os.PathLike[str]) -> FrictionLaw:
 @lru_cache(maxsize=64)
 def _packaged_law(name: str) -> FrictionLaw:
     if name not in list_laws():
-        known = nearest(name, list_laws(), kind="laws")
+        suggestion = nearest(name, list_laws(), kind="laws")
         raise ModelError(
             f"there is no law '{name}'",
-            remedy=f"{known}; for your own law pass the FrictionLaw object, or the path of a .toml file",
+            remedy=f"{suggestion}; for your own law pass the FrictionLaw object, or the path of a .toml file",
         )
     path = models_folder() / "laws" / f"{name}.toml"
     return law_of_text(read_text(path), str(path))[0]

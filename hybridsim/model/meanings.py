@@ -53,11 +53,11 @@ class Meanings:
         return self.definitions.get(name)
 
     def moves(self, node: ast.expr) -> bool:
-        """Return whether the value of a tree can change while all modes stay active."""
+        """Return whether the value of a syntax tree can change while all modes stay active."""
         return not names_of(node).isdisjoint(self.moving)
 
     def reached(self, trees: Iterable[ast.expr]) -> set[str]:
-        """Return the definitions on which some trees depend."""
+        """Return the definitions on which some syntax trees depend."""
         open_ = {name for tree in trees for name in names_of(tree)} & self.definitions.keys()
         found: set[str] = set()
         while open_:

@@ -240,7 +240,7 @@ def _draw(axis: Axes, samples: Samples, name: str, colour: str, dashes: Any) -> 
 
 
 def _mark(axis: Axes, marks: Mapping[str, np.ndarray]) -> None:
-    """Draw a thin line at each event, unless there are too many, and a triangle at the top for monitors."""
+    """Draw a thin line at each event, unless there are too many events, and a triangle at the top for monitors."""
     for times in marks.values():
         if len(times) <= _MOST_MARKS:
             for t in times.tolist():

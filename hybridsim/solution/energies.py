@@ -159,9 +159,9 @@ class Energies(EventsAndModes):
         found = integral(integrand, edges, width)
         return found if last >= first else -found
 
-    def _measured(self, name: str, value: Any, where: str) -> Any:
+    def _measured(self, name: str, value: Any, kind_of_model: str) -> Any:
         if value is None:
             raise AttributeError(
-                f"this Solution has no {name}: only a run of {where} has this result", name=name
+                f"this Solution has no {name}: only a run of {kind_of_model} has this result", name=name
             )
         return value

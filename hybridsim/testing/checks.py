@@ -21,7 +21,7 @@ def at_times(times: Sequence[float]) -> str:
 
 
 def exact_stick(component: str, held: Mapping[str, float], rest: tuple[str, ...] = ()) -> Check:
-    """Return a function that checks that held states are exact in stick, and that the states in `rest` are constant."""
+    """Return a check of a solution: held states are exact in stick, and the states in `rest` are constant."""
 
     def check(solution: Any) -> list[str]:
         names = [state.name for state in solution.model.states]
@@ -68,7 +68,7 @@ def no_transition(solution: Any) -> list[str]:
 
 
 def equals(t: float, **values: float) -> Check:
-    """Return a function that checks values of quantities at a time; events at this time are applied first."""
+    """Return a check of a solution: quantities have given values at a time, just after the events at this time."""
 
     def check(solution: Any) -> list[str]:
         found = {name: float(solution.output(name, t)) for name in values}
@@ -80,7 +80,7 @@ def equals(t: float, **values: float) -> Check:
 
 
 def says(*texts: str) -> Check:
-    """Return a function that checks that the message of a stopped run contains given words."""
+    """Return a check of a solution: the message of the stopped run contains given words."""
 
     def check(solution: Any) -> list[str]:
         return [

@@ -1,4 +1,4 @@
-"""Published and recomputed results with which the test cases are compared."""
+"""This module reads published and recomputed results, with which the test cases are compared."""
 
 from __future__ import annotations
 

@@ -102,7 +102,7 @@ class Limits:
         return f"the budget of {self.budget.seconds:.3g} s is spent"
 
     def warm(self, ask: Callable[[Watch | None], Answer], watch: Watch) -> Answer:
-        """Compute the answer; if this is fast, repeat it, so that the cost contains no one-time set-up."""
+        """Compute the answer; repeat a fast computation, so that its cost contains no one-time set-up."""
         first = ask(watch)
         if not self.repeat or first.seconds > _AGAIN_BELOW:
             return first

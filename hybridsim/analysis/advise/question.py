@@ -272,7 +272,7 @@ def question_of(model: Model, quantity: Any, t_span: tuple[float, float] | None,
         if t_span is not None or rest:
             raise UsageError(
                 f"`quantity` cannot be {quantity!r}",
-                remedy="use 'period' without a name after it and without `t_span`",
+                remedy="write 'period' alone, and remove `t_span`",
             )
         return Question(quantity, None, None, accuracy)
     names = _names(model, head)

@@ -20,7 +20,7 @@ _NEUTRAL = 2e-4  # growth per repetition that is allowed, as of a direction in w
 
 
 def grows(period_map: PeriodMap, scale: np.ndarray, multiple: int, direction: np.ndarray) -> bool:
-    """Return whether a small change of a repeating motion grows; if it does not, put the map back to its start.
+    """Return whether a small change of a repeating motion grows; if not, return the map to its state at the call.
 
     After some repetitions the change is in the direction, or in the plane of a complex pair, that shrinks least or
     grows fastest. Three changes in a row then determine the largest multipliers. The motion is followed with and

@@ -8,7 +8,7 @@ import numpy as np
 
 
 class PeriodMap(Protocol):
-    """A map from the states (n,) at the beginning of a period to the states at its end, which also gives the modes."""
+    """A map from the states (n,) at the start of a period to the states at its end; the map also gives the modes."""
 
     period: float
     periods: int  # followed so far

@@ -166,7 +166,7 @@ def _solve_one(balanced: Callable[[float], float], start: float) -> np.ndarray:
     low = start / _BELOW
     if balanced(low) < low:
         raise DoesNotApply(
-            "the harmonic balance has no solution whose damping exceeds 1/1000 of its first estimate"
+            "the harmonic balance has no solution whose damping exceeds 1/1000 of the first estimate of the damping"
         )
     high = 2.0 * low
     while balanced(high) > high:

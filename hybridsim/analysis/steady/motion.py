@@ -182,7 +182,7 @@ class Motion:
         return solution
 
     def _longer(self, solution: Solution, duration: float, is_carried: bool) -> Solution:
-        """Continue a run that has reached its limits, for as many steps as it has taken, within the cost limit."""
+        """Continue a run that has reached its limits, by as many steps as before, within the cost limit."""
         spent, reached = _cost_of(solution), solution.t_end - solution.t_start
         spent += _cost_of_carrying(solution) if is_carried else 0.0
         if (

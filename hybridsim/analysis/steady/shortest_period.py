@@ -18,7 +18,7 @@ _NEAR = 1e3
 def with_shortest_period(
     motion: Motion, orbit: Orbit, scale: np.ndarray, is_forced: bool, tol: float
 ) -> Orbit:
-    """Return the orbit with its shortest period; the period found before may be a multiple of it.
+    """Return the orbit with its shortest period, of which the period found before may be a multiple.
 
     Near a doubling of the period, one passage does not return to the start within the tolerance. Then Newton's method
     decides whether an orbit with the shorter period is there. After a doubling it no longer attracts. It may be one of

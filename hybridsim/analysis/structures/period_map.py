@@ -130,7 +130,7 @@ class PeriodMap:
         return with_floor(np.maximum(half, FLOOR * largest), self.masses), bool(rests.all())
 
     def recorded(self, periods: int, offset: float) -> SeriesTrajectory:
-        """Record the motion over some periods, beginning within the first one; the map cannot be used afterwards."""
+        """Record the motion over some periods from the time `offset` on; the map cannot be used afterwards."""
         if offset > 0.0:
             self._carry_out((0.0, offset))
         self._run.is_recorded = True

@@ -103,8 +103,8 @@ def execute(args: argparse.Namespace, session: Session) -> int:
     finally:
         say(found.to_json() if args.json else found.table())
     if found.region is not None:
-        for text, count in found.region.problems():
-            complain(f"{count} of {found.region.status.size} points: {text}")
+        for error, count in found.region.problems():
+            complain(f"{count} of {found.region.status.size} points failed: {error}")
     return 0
 
 

@@ -38,8 +38,8 @@ def execute(args: argparse.Namespace, session: Session) -> int:
     elif args.action == "clear":
         freed, others = clear()
         complain(f"deleted {freed / 1e6:.1f} MB in {root}")
-        for other in others:
-            complain(f"{other} was not deleted, because hybridsim did not create it")
+        for folder in others:
+            complain(f"{folder} was not deleted, because hybridsim did not create it")
     else:
         _warm()
     return 0

@@ -184,8 +184,8 @@ def _fill(
             journal.unlink(missing_ok=True)
     finally:
         say(result.to_json() if args.json else result.table())
-    for text, count in result.problems():
-        complain(f"{count} of {result.status.size} points: {text}")
+    for error, count in result.problems():
+        complain(f"{count} of {result.status.size} points failed: {error}")
     if result.interrupted:
         complain(f"interrupted after {int((~result.failed).sum())} of {result.status.size} points")
         return session.interrupted_code

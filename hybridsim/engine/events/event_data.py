@@ -69,7 +69,7 @@ class EventData:
         return self.series[key]
 
     def fired_guards(self) -> list[tuple[int, int, int]]:
-        """Return (component, index in its mode, guard number) of the located guards."""
+        """Return (component, index in its mode, guard number) of each guard that was located at zero."""
         table = self.system.guards_of(self.at.z)
         return [
             (c, j, int(g))

@@ -1,4 +1,4 @@
-"""Represent each monitor as a component whose mode is the sign of the monitor, so that compiled loops find its zeros.
+"""Represent monitors as components whose modes are the signs of the monitors, so that compiled loops find all zeros.
 
 Such a component is a corner, like one of ``abs``. Its two modes, ``+`` and ``-``, in which the monitor is positive and
 negative, have the same rates. A zero of the monitor changes the mode and nothing else. The corners follow all other

@@ -94,7 +94,7 @@ class EventResolution(ClusterChoice):
         return self._stop(*self._cascade())
 
     def _begins_round(self) -> bool:
-        """Count a round of transitions or choices; return False if there are too many at one instant."""
+        """Count a round of transitions or choices; return False if one instant has too many rounds."""
         self.rounds += 1
         return self.rounds <= self.most_rounds
 

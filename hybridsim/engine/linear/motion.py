@@ -276,7 +276,7 @@ def guard_terms(lin: Any, k: int, g: int, c: Any, terms: Any) -> tuple[float, fl
 
 @inlined
 def first_zero_of_wave(lin: Any, k: int, g: int, c: Any, bound: float) -> tuple[int, float]:
-    """Find the first zero of a guard a + r cos(omega s + phase), or OPEN if it is nearly a double zero."""
+    """Find the first zero of a guard a + r cos(omega s + phase), or OPEN if this zero is nearly double."""
     j, terms = lin.waves[k, g], lin.terms
     level, size = 0.0, 0.0
     for i in range(lin.counts[k]):

@@ -56,7 +56,7 @@ def eliminated(
 def never_all_zero(
     lowering: LoweringState, surfaces: Mapping[tuple[int, int], Any]
 ) -> set[tuple[int, int]] | None:
-    """Return the constraints of gaps that are linearly dependent, but have a combination that is never zero.
+    """Return the constraints of gaps that are linearly dependent, but can never all be zero.
 
     The result is None if other surfaces are linearly dependent, or gaps that can all be zero.
 

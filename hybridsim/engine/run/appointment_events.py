@@ -22,7 +22,7 @@ from hybridsim.engine.system.system import System
 def events_before_appointment(
     system: System, instant: Instant, found: Located, schedules: tuple[int, ...], forward: bool
 ) -> Located:
-    """Return a located event without guards that do not fire after the input jump, or that wait for a schedule.
+    """Remove from a located event the guards that do not fire after the input jump, or that wait for a schedule.
 
     Guards that do not become negative on the new pieces of inputs are dropped. The rest is resolved on these pieces,
     while conditions and resets read the inputs before a jump. A load at zero waits for schedules that are due.

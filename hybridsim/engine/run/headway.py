@@ -1,4 +1,4 @@
-"""Stop runs that would take days, and switch to a stiff method if that is faster."""
+"""Stop runs that would take days, and switch to a stiff method if the stiff method is faster."""
 
 from __future__ import annotations
 

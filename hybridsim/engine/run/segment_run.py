@@ -161,10 +161,10 @@ class SegmentRun:
                 f"({step.s1:.9g}) and were discarded; the last step was {length:.3g}",
             )
 
-    def _collapse(self, since: float, how: str) -> NoReturn:
+    def _collapse(self, since: float, reason: str) -> NoReturn:
         """End the run at the local time at which its steps became too short."""
         self._go_back(since)
-        raise Creeping(f"steps became too small at t = {float(self.origin.plus(since)):.9g}: {how}", since)
+        raise Creeping(f"steps became too small at t = {float(self.origin.plus(since)):.9g}: {reason}", since)
 
     def _go_back(self, s: float) -> None:
         """Discard everything after the end of the given step."""
@@ -180,13 +180,13 @@ class SegmentRun:
         try:
             shape = np.shape(step.dense(times))
         except (TypeError, ValueError, IndexError) as error:
-            found = f"fails for an array of times ({type(error).__name__}: {error})"
+            fault = f"fails for an array of times ({type(error).__name__}: {error})"
         else:
-            found = f"gives an array of shape {shape} for {len(times)} times and {n} states"
+            fault = f"gives an array of shape {shape} for {len(times)} times and {n} states"
             if shape == (len(times), n):
                 return
         raise UsageError(
-            f"the dense output of a step of {getattr(self.method, 'name', 'the integrator')} {found}",
+            f"the dense output of a step of {getattr(self.method, 'name', 'the integrator')} {fault}",
             remedy="step.dense(times) must accept an array of k local times and return states of shape (k, n)",
         )
 
@@ -287,7 +287,7 @@ class SegmentRun:
         return want in (0, direction)
 
     def _is_recorded(self, hit: Hit, first: tuple[Hit, bool] | None) -> bool:
-        """Return whether a monitor's crossing needs nothing but a record, and no event precedes it in the step."""
+        """Return whether a monitor's crossing only has to be recorded, and no event comes before it in the step."""
         is_before = first is None or hit.theta < first[0].theta
         recorded = self.monitors[hit.number].action == "record"
         return is_before and recorded and self._fires_in(hit.number, hit.direction)

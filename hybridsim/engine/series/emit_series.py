@@ -118,7 +118,7 @@ def _expanded(tape: ModeTape, order: int, stride: int, is_known: bool = False) -
 
 
 def series_function(name: str, tape: ModeTape, order: int) -> str:
-    """Return a function that writes the Taylor series of states, guards and vanishing functions."""
+    """Return a function that writes the Taylor series of states, guards and functions that may fall below rounding."""
     size = order + 1
     code = _expanded(tape, order, size, is_known=True)
     code.write("%out", tape.states, size)

@@ -12,11 +12,11 @@ MAX_POWER = 64  # largest power that is distinguished
 
 @inlined
 def register_of(number: int) -> int:
-    """Return the register number that the code of a vanishing function contains."""
+    """Return the number of the register in the code of a function that may fall below rounding."""
     return number // (KINDS * MAX_POWER)
 
 
 @inlined
 def power_of(number: int) -> int:
-    """Return the power that the code of a vanishing function contains."""
+    """Return the power in the code of a function that may fall below rounding."""
     return number // KINDS % MAX_POWER + 1

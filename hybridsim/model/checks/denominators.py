@@ -1,4 +1,4 @@
-"""This module finds denominators in rates that may become zero, which an integration step can miss."""
+"""This module finds denominators of rates that may become zero; an integration step can miss such a zero."""
 
 from __future__ import annotations
 

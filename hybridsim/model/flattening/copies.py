@@ -65,7 +65,7 @@ class Copies:
         return prefixed(expr, self.prefix, self.use, own)
 
     def named(self, values: Mapping[str, Expression]) -> dict[str, Expression]:
-        """Return expressions whose keys are names of quantities of the whole model."""
+        """Return a dict from names of quantities in the whole model to expressions."""
         return {self.prefix + name: self.expr(value) for name, value in values.items()}
 
     def _contact(self, contact: Contact) -> dict[str, Any]:

@@ -49,7 +49,7 @@ class IndexedExpression:
     references: tuple[Reference, ...] = field(default=(), compare=False, repr=False)
 
     def at(self, number: int | None, repeats: Mapping[str, int]) -> Expression:
-        """Return the ordinary expression for the copy with a given number.
+        """Return the expression without an index, for the copy of a part that has a given number.
 
         A condition on i alone is decided first, so that the other branch need not exist. ``block[3].x`` becomes
         ``block3.x``.

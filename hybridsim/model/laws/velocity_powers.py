@@ -207,7 +207,7 @@ def _vanishes(node: ast.expr, family: Family, numbers: Mapping[str, float], mean
 
 
 def _rounded(base: ast.expr, power: float | None, is_force: bool) -> str:
-    """Return the remedy: a whole number as exponent, or a smooth function that contains a small speed b."""
+    """Return the remedy for a fractional power of a velocity: a whole exponent, or a smooth function."""
     if power is not None and power == round(power):
         return f"write the exponent as the number {power:g}"
     if is_force and isinstance(base, ast.Call) and write(base.func) == "abs":

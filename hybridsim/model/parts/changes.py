@@ -105,10 +105,10 @@ def under_law(contact: Contact, law: FrictionLaw | str, passed: Mapping[str, Any
             arguments[name] = contact.values()[name]
     missing = [name for name, value in law.parameters.items() if value is None and name not in arguments]
     if missing:
-        values = ", ".join(f"{name}=..." for name in missing)
+        arguments_to_pass = ", ".join(f"{name}=..." for name in missing)
         raise UsageError(
             f"{title}: the law '{law.name}' needs a value for {', '.join(map(repr, missing))}",
-            remedy=f"add {values}; the contact has {_listed(contact)}",
+            remedy=f"pass {arguments_to_pass}; the contact has {_listed(contact)}",
         )
     states = {state.name for state in law.states}
 

@@ -13,7 +13,7 @@ from hybridsim.model.parts.frozen_map import FrozenMap
 
 @dataclass(frozen=True)
 class LawOfUse:
-    """A law and the values of its parameters, which are expressions of the model that contains the part."""
+    """A law with values of its parameters; the values are expressions of the model that contains the part."""
 
     law: FrictionLaw
     arguments: Mapping[str, IndexedExpression] = field(default_factory=FrozenMap)

@@ -52,7 +52,9 @@ def read_model(text: str, path: str | None = None) -> Model:
 def open_text(text: str, path: str | None, kind: str) -> Table:
     """Return the top table of a TOML text, or raise ModelError if it is empty or not valid TOML."""
     if not text.strip():
-        raise ModelError("the file is empty", place=Place(path), remedy="write at least [states]")
+        raise ModelError(
+            "the file is empty", place=Place(path), remedy="declare at least one state, under [states]"
+        )
     try:
         data = tomllib.loads(text)
         source = Source(path, _split(text), positions(text))

@@ -83,7 +83,7 @@ def scene(example: Example) -> Axes:
 
 
 def _error(right: Line, failing: Line) -> np.ndarray | None:
-    """Return the difference of the two runs if it is above rounding but too small to see, else None."""
+    """Return the difference of two runs if this difference exceeds rounding but is too small to see, else None."""
     if failing.t.size < 2:
         return None
     off = np.interp(right.t, failing.t, failing.x, left=np.nan, right=np.nan) - right.x

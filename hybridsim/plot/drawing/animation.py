@@ -100,7 +100,7 @@ def check_animation(model: Model, path: Path) -> None:
     if path.suffix.lower() == ".mp4" and shutil.which("ffmpeg") is None:
         raise UsageError(
             f"{path}: an MP4 needs the program ffmpeg, which was not found",
-            remedy="install ffmpeg (apt install ffmpeg, brew install ffmpeg), or write a .gif or .html",
+            remedy="install ffmpeg (apt install ffmpeg, brew install ffmpeg), or write a .gif or .html file",
         )
 
 
@@ -169,4 +169,4 @@ def _write_film(path: Path, pictures: Iterator[Picture], clip: Clip) -> None:
                 pass  # ffmpeg has ended, and its message says why
             message = process.stderr.read().decode(errors="replace").strip()
         if process.returncode:
-            raise UsageError(f"{path}: ffmpeg failed: {message}", remedy="write a .gif or .html instead")
+            raise UsageError(f"{path}: ffmpeg failed: {message}", remedy="write a .gif or .html file instead")

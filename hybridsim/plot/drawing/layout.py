@@ -94,7 +94,7 @@ def layout_of(poses: Sequence[Poses]) -> Layout:
 
 
 def _side(pose: Pose, bodies: Sequence[Points], unit: float) -> float:
-    """Return the side of a line that contains the bodies touching it, or all bodies if none touches it."""
+    """Return the side of a line on which the bodies lie that touch the line, or else on which all bodies lie."""
     direction = direction_of(pose)
     normal = np.array([-direction[1], direction[0]])
     across = [(body - pose.at) @ normal for body in bodies]

@@ -103,7 +103,7 @@ def _prefixed(unit: str, power: int) -> str:
 
 
 def scaled_unit(unit: str, low: float, high: float) -> tuple[int, str]:
-    """Return a power of ten that suits values from low to high, and the unit, with its prefix if it accepts one."""
+    """Return a power of ten that suits values from low to high, and the unit, with a prefix if the unit accepts one."""
     size = max(abs(low), abs(high))
     power = 3 * math.floor(math.log10(size) / 3 + 1e-9) if size > 0 and math.isfinite(size) else 0
     power = min(max(power, -12), 9)

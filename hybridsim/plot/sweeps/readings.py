@@ -42,8 +42,8 @@ def chosen_names(result: Sweep, names: Sequence[str], arrays: bool) -> tuple[str
     drawable = [name for name in result.values if _drawable(result, name, arrays)]
     for name in names:
         if result[name] is not None and name not in drawable:
-            what = "text" if result[name].dtype.hasobject else "an array at each point"
-            raise UsageError(f"{name} is {what}, which cannot be drawn", remedy=f"draw one of {drawable}")
+            content = "text" if result[name].dtype.hasobject else "an array at each point"
+            raise UsageError(f"{name} is {content}, which cannot be drawn", remedy=f"draw one of {drawable}")
     found = tuple(names) or _first_asked_for(drawable)
     if not found:
         raise UsageError(

@@ -125,7 +125,7 @@ class Expansion:
 
 
 def terms_of(node: Node, rates: Mapping[int, Node]) -> tuple[Term, ...]:
-    """Return the terms of a sum; for a state, also the terms of its rate."""
+    """Return the terms whose sum is a quantity; for a state, also the terms of its rate."""
     found: list[Term] = []
     log2 = node.context.mag
     open_ = [(node, 0, False)]

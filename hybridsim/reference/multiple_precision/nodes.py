@@ -154,7 +154,7 @@ class Power(Node):
 
 
 class Integral(Node):
-    """A function f(u), computed as the integral of its slope, which may depend on f."""
+    """A function f(u), computed as the integral of its slope; the slope may depend on f."""
 
     __slots__ = ("first", "slope", "weights")
 

@@ -81,7 +81,7 @@ class Reading:
         return self._walk(expr.tree)
 
     def _signal(self, signal: Signal, piece: Sequence[Held]) -> Node:
-        """Return the node of an input from the start and the four coefficients of its present cubic piece."""
+        """Return the node of an input from the start and the four coefficients of its present cubic polynomial."""
         knot, *coefficients = piece
         passed = self.sum(self.time, knot, minus=True)
         total: Node = coefficients[3]

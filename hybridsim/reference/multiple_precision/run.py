@@ -77,7 +77,7 @@ class Run:
     # -- steps ----------------------------------------------------------------------------------------------
 
     def _step(self) -> None:
-        """Make one step, which ends at the first event in it if there is one."""
+        """Make one step, which ends at the first event within the step, if there is an event."""
         point, expansion = self.now.point, self.now.expansion
         appointment = self.appointments.next(point.t)
         bound = appointment.t - point.t

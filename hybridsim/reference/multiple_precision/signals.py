@@ -44,7 +44,7 @@ class Signal:
         return self.declared.kind == "chirp" or self.declared.shape == "sine"
 
     def piece(self, t: Number) -> tuple[Number, ...]:
-        """Return the start and the four coefficients of the cubic piece that begins at or before a time."""
+        """Return the start and the four coefficients of the polynomial that the input follows at a time."""
         zero = self.number(0)
         if self.declared.kind == "table":
             index = bisect_right(self._times, t)

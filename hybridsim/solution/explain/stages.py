@@ -130,7 +130,7 @@ class _Instant:
         ]
 
     def located(self, fired: list[int]) -> list[Stage]:
-        """Return the choices of modes that followed from located guards and monitors."""
+        """Return the choices of modes that followed from guards and monitors located at zero."""
         at = situation(self.system, self.segment, fired)
         found = self._nothing(at, {g: k for k, g in enumerate(fired)})
         if self.is_general and (self.schedules or self.knots) and (fired or self.stopping):

@@ -93,7 +93,7 @@ def turning_belt() -> Scene:
 
 
 def sequence(expected: list[str]) -> Any:
-    """Return a function that checks the order of the mode changes, but not their times."""
+    """Return a check of a solution: the mode changes have the expected order; their times are not checked."""
 
     def check(solution: Any) -> list[str]:
         found = [f"{e.component}:{e.target}" for e in solution.events if e.component]

@@ -16,7 +16,7 @@ def scenes() -> tuple[Scene, ...]:
 
 
 def _transitions(component: str, expected: Sequence[tuple[float, str]], within: float = 1e-3) -> Check:
-    """Return a function that checks that a component changes its mode only near the expected times."""
+    """Return a check of a solution: a component changes its mode only near the expected times."""
 
     def check(solution: Any) -> list[str]:
         found = [(event.t, event.target) for event in solution.events if event.component == component]

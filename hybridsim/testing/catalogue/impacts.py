@@ -36,7 +36,7 @@ def closed(name: str, solution: Any) -> list[float]:
 
 
 def closes(*names: str) -> Any:
-    """Return a function that checks that each contact closes exactly once."""
+    """Return a check of a solution: each contact closes exactly once."""
 
     def check(solution: Any) -> list[str]:
         found = {name: closed(name, solution) for name in names}
@@ -50,7 +50,7 @@ def closes(*names: str) -> Any:
 
 
 def rests(*names: str) -> Any:
-    """Return a function that checks that contacts close at the time at which the bounces end, within 1e-6."""
+    """Return a check of a solution: contacts close at the time at which the bounces end, within 1e-6."""
 
     def check(solution: Any) -> list[str]:
         found = {name: closed(name, solution) for name in names}

@@ -32,7 +32,7 @@ def scenes() -> tuple[Scene, ...]:
 
 
 def stays(component: str, *terms: str, to_one: bool = False) -> Check:
-    """Return a function that checks that a sum of states, or of their squares, is 0 or 1 during sliding."""
+    """Return a check of a solution: a sum of states, or of their squares, is 0 or 1 during sliding."""
 
     def check(solution: Any) -> list[str]:
         for interval in solution.modes[component]:

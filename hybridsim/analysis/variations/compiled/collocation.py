@@ -56,7 +56,7 @@ class FlowScratch(NamedTuple):
 
 @kernel
 def begin_segment(run: Any, inputs: Any, work: Any, i: int) -> None:
-    """Set the constants and their derivatives in segment i."""
+    """Set the constants that the rates read in segment i, with their derivatives."""
     seeds = work.seeds
     for r in range(seeds.shape[0]):
         for j in range(seeds.shape[1]):

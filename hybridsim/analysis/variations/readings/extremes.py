@@ -104,7 +104,7 @@ class Extremes:
         return float((sign * legendre.legval(low + (high - low) * _BETWEEN, self._series[k])).min())
 
     def _representative(self, group: list[Place], sign: int) -> Place:
-        """Return the best place of a group; constant parts and ends of segments are preferred to local extrema."""
+        """Return one point of a group of equal extrema; constant parts and ends of segments come before others."""
         best = max(sign * place.value for place in group)
         near = [place for place in group if sign * place.value >= best - _SAME * self.size]
         return max(near, key=lambda place: (place.where == HELD, place.where != INSIDE, sign * place.value))

@@ -21,7 +21,7 @@ _rank_candidates, _joint_choice, _is_settled = map(Precompiled, (rank_candidates
 
 
 class JudgedCandidates(NamedTuple):
-    """The candidates for the modes of several components, the verdicts so far, and the chosen candidate."""
+    """The combinations of modes to choose from, the verdicts so far, and the chosen combination."""
 
     candidates: np.ndarray  # modes (k, members)
     verdicts: np.ndarray  # (k,)
@@ -72,6 +72,6 @@ def completed(
 def all_verdicts(
     resolution: EventVerdicts, members: list[int], candidates: np.ndarray, cluster: tuple[int, ...]
 ) -> np.ndarray:
-    """Return the verdicts on all candidates for the modes of several components."""
+    """Return the verdicts on all given combinations of modes."""
     verdicts = np.full(len(candidates), _UNJUDGED, dtype=np.int64)
     return completed(resolution, members, JudgedCandidates(candidates, verdicts, 0), cluster)

@@ -17,7 +17,7 @@ Failure = tuple[str, str]  # status and message
 def guards_taken_together(
     resolution: EventData, read_from: Situation, component: int, leaving: Sequence[int]
 ) -> tuple[list[tuple[int, int]], Failure | None]:
-    """Return the guards whose transitions are taken, with the number of the chosen transition, or an error.
+    """Return the guards whose transitions are taken, each with the number of its chosen transition, or an error.
 
     leaving: positions of the guards that become negative, in the order in which they reached zero. read_from: the
     situation that conditions and resets read. If several guards are negative when the mode begins, the first declared

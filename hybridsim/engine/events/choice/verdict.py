@@ -78,7 +78,7 @@ def open_question(series: Any, bounds: Any, decreed: int) -> bool:
 
 @inlined
 def is_release(automata: Any, event: Any, z: Any, c: int) -> bool:
-    """Return whether a component leaves its holding mode through its located guard in the modes `z`."""
+    """Return whether a component leaves its holding mode by a guard that was located at zero, in the modes `z`."""
     return z[c] != automata.hold[c] and event.released_to[c] == (0 if z[c] == automata.above[c] else 1)
 
 

@@ -41,7 +41,7 @@ NO_RESET = -1
 
 
 class KnownTimeArrays(NamedTuple):
-    """The known times ahead of a compiled loop; the last one is the target of the call and has the kind -1."""
+    """The known times that a call of a compiled loop has to process; the last one, of kind -1, ends the call."""
 
     times: np.ndarray  # (K, 2) instants (high, low)
     kinds: np.ndarray  # (K,) rows of `resets`
@@ -57,7 +57,7 @@ def has_known_times(system: System) -> bool:
 
 
 def known_time_arrays(system: System) -> Any:
-    """Return packed arrays for the known times of one call; a model without known times needs only the target."""
+    """Return packed arrays for the known times of one call; a model without known times needs only the call's end."""
     most = MAX_KNOWN_TIMES + 1 if has_known_times(system) else 1
     return packed(
         KnownTimeArrays(
@@ -71,7 +71,7 @@ def known_time_arrays(system: System) -> Any:
 
 
 def store_known_times(arrays: Any, known: KnownTimes, resets: np.ndarray) -> None:
-    """Write the known times ahead of a call to the arrays of the call, followed by the target of the call."""
+    """Write the known times that a call has to process to its arrays, followed by the time at which the call ends."""
     m = len(known.kinds)
     arrays.times[:m], arrays.times[m] = known.instants, known.target
     arrays.kinds[:m], arrays.kinds[m] = known.kinds, -1

@@ -30,7 +30,7 @@ _IMPULSE_ERROR = 8.0 * UNIT  # relative error of an impulse, and of a state that
 
 @inlined
 def _coefficient(lin: Any, k: int, g: int, order: int, work: Any) -> tuple[float, float]:
-    """Return a Taylor coefficient of a guard after `guard_series`, with its error bound."""
+    """Return a Taylor coefficient of a guard, as `guard_series` has written it, with its error bound."""
     if has_tables(lin):
         return linear_coefficient(lin, k, g, order, work.x_after, work.slopes, work)
     return work.judged[0, g, order], work.judged[1, g, order]

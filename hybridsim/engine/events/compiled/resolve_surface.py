@@ -33,7 +33,7 @@ def cluster_of(automata: Any, c: int) -> Any:
 def row_verdict(
     automata: Any, lin: Any, k: int, z: Any, members: Any, continuous: bool, row: int, work: Any
 ) -> int:
-    """Return the verdict on the guards of `members` in the modes of row `k`, without all other guards.
+    """Return the verdict on the guards of `members` in the modes of row `k`, and ignore all other guards.
 
     A monitor that stays at zero has reached its event, which compiled loops do not record. It is UNDECIDED.
     """

@@ -154,7 +154,7 @@ def surfaces_of(system: System) -> tuple[np.ndarray, ...]:
 
 @per_structure
 def _is_supported(system: System) -> bool:
-    """Return whether compiled code can choose the first modes: all components are contacts, and there are few."""
+    """Return whether compiled code can choose the first modes: there are only contacts, and only a few of them."""
     are_set_valued = all(a.has_surface and not (a.is_unique or a.is_unilateral) for a in system.automata)
     count = len(system.automata)
     return ENABLED and system.has_tape and are_set_valued and 0 < count <= MAX_JOINT_COMPONENTS and not (

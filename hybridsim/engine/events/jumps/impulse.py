@@ -160,7 +160,7 @@ def _same(one: Answer, other: Answer) -> bool:
 
 
 def _between(problem: ImpactProblem, dead: Answer, lively: Answer) -> Answer:
-    """Return the impulses closest to `lively`, on the line from `dead` to `lively`, whose work is not positive.
+    """Mix `lively` impulses, which do positive work, with `dead` impulses, so that the work is not positive.
 
     The work is quadratic in the position w on this line, not positive at 0 and positive at 1.
     """

@@ -270,7 +270,7 @@ class Accumulation:
         return None
 
     def limit(self, instant: Instant, components: tuple[int, ...]) -> Limit | None:
-        """Add an event of some components; return the limit of accumulating events if it is close."""
+        """Add an event of some components; return the limit of accumulating events if this limit is close."""
         times = {c: self._limit_of(instant, c) for c in components}
         ended = [(self._sign * time, c) for c, time in times.items() if time is not None]
         return self._shared(self._sign * min(ended)[0], min(ended)[1]) if ended else None

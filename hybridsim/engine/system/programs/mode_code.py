@@ -107,7 +107,7 @@ def _highest_power(rows: Iterable[tuple[int, ...]], first: int, count: int) -> i
 
 
 def most_fading(system: System) -> int:
-    """Return an upper bound of the number of vanishing functions in one combination of modes."""
+    """Return an upper bound of the number of functions that may fall below rounding in one combination of modes."""
     parts = system.code.data["tape"]["parts"]
     return sum(_may_fade(op, b) for _, branches in parts for rows in branches for op, _, b, *_ in rows)
 

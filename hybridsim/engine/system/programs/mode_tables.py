@@ -173,7 +173,7 @@ class TapeCache:
         return self.tapes
 
     def with_complete_set(self) -> Tapes:
-        """Return the tapes of all combinations of modes if there are few, otherwise the tapes so far.
+        """Return the instruction tapes of all combinations of modes if these are few, otherwise the tapes so far.
 
         The tables of linear modes of few combinations are made at once.
         """

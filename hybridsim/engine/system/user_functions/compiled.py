@@ -198,7 +198,7 @@ overload(_put)(_put_compiled)
 
 @numba.njit
 def _nothing(s: float, x: Any, p: Any, z: Any, out: Any) -> None:
-    """Do nothing; this function ends a chain of functions."""
+    """Do nothing; this is the last function in a chain of functions, each of which writes one number."""
 
 
 def _constant(value: float) -> Any:
@@ -210,7 +210,7 @@ def _constant(value: float) -> Any:
 
 
 def _one_more(write: Any, place: int, component: int, mode: int, rest: Any) -> Any:
-    """Return a function that writes one number, or 1 in modes without this number, and then calls `rest`."""
+    """Return a function that writes a number of one mode (or 1 in other modes), and then calls the function `rest`."""
 
     @numba.njit
     def write_row(s: float, x: Any, p: Any, z: Any, out: Any) -> None:
