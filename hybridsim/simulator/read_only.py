@@ -25,8 +25,8 @@ class ReadOnly(dict[str, Value]):
         self._title, self._remedy = title, remedy
 
     def _refuse(self, name: object, *value: object) -> NoReturn:
-        change = f"set to {value[0]!r}" if value else "deleted"
-        raise UsageError(f"{self._title}[{name!r}] cannot be {change}", remedy=self._remedy)
+        operation = f"set to {value[0]!r}" if value else "deleted"
+        raise UsageError(f"{self._title}[{name!r}] cannot be {operation}", remedy=self._remedy)
 
     def _refuse_all(self, *_: object, **__: object) -> NoReturn:
         raise UsageError(f"{self._title} cannot be changed", remedy=self._remedy)

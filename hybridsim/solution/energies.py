@@ -55,7 +55,7 @@ class Energies(EventsAndModes):
         """
         if not quantities:
             raise UsageError(
-                "integral() has no quantity",
+                "integral() got no quantity",
                 remedy='use the names of one or several quantities: sol.integral("f", "v")',
             )
         for name in quantities:

@@ -146,11 +146,11 @@ class States:
             )
         if (outside := self._outside(times)) is not None:
             bad, (low, high) = times[outside][0], sorted((self.t_start, self.t_end))
-            whole = (
+            stored_part = (
                 "the run" if self._save == "all" else f"the part of the run that keep={self._save!r} stores"
             )
             raise UsageError(
-                f"t = {float(bad)!r} is outside {whole}, which covers t = {low!r} to {high!r}",
+                f"t = {float(bad)!r} is outside {stored_part}, which covers t = {low!r} to {high!r}",
                 remedy="use times that the run covers",
             )
         return times, side

@@ -67,7 +67,8 @@ def test_points_of_a_killed_process_run_again(
     assert code == 1
     assert "1 of 3 points: ok" in out
     assert (
-        "2 of 3 points failed: the executor lost the batch" in err and "again to compute the missing points" in err
+        "2 of 3 points failed: the executor lost the batch" in err
+        and "again to compute the missing points" in err
     )
     assert (tmp_path / "o" / "sweep.journal").exists()
     code, out, err = hybridsim(*argv)

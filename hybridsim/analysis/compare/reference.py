@@ -94,9 +94,9 @@ def find_reference(
     def timed(integrator: str, **options: Any) -> Solution:
         try:
             return run(integrator, **options, progress=TimeBudget(seconds))
-        except OutOfTime as late:
+        except OutOfTime as timeout:
             raise _TooLong(
-                f"the run with {_describe((integrator, options))} was {late}",
+                f"the run with {_describe((integrator, options))} was {timeout}",
                 remedy="shorten the span, pass a larger `budget` or a `reference`",
             ) from None
 

@@ -68,8 +68,8 @@ class Record:
             raise UsageError(
                 f"the `data` of the record have no column 't'; the columns are: "
                 f"{', '.join((*columns, *dropped)) or 'none'}",
-                remedy="name the column of times t, or rename it: quantities={'time': 't'}, "
-                "on the command line --column time=t",
+                remedy="the column of the times must have the name t; rename it with quantities={'time': 't'}, "
+                "or with --column time=t on the command line",
             )
         t = self._times(columns.pop("t"))
         if len(t) < 2 or not np.isfinite(t).all() or not (np.diff(t) > 0.0).all():
@@ -128,8 +128,8 @@ class Record:
                 raise UsageError(
                     f"model {model.name} has no quantity {name!r}, which is a column of a record",
                     remedy=f"{nearest(name, known, kind='quantities')}; "
-                    "hs.Record(data, quantities={column: quantity}) selects and renames columns, "
-                    "on the command line --column COLUMN=QUANTITY",
+                    "to select and rename columns, use hs.Record(data, quantities={column: quantity}), "
+                    "or --column COLUMN=QUANTITY on the command line",
                 )
 
 
@@ -163,7 +163,7 @@ def _nothing_measured(dropped: tuple[str, ...]) -> UsageError:
     return UsageError(
         f"`quantities` selects no measured quantity, and drops the columns {', '.join(dropped)}",
         remedy=f"add the measured columns, such as quantities={{{dropped[0]!r}: QUANTITY}}, "
-        f"on the command line --column {dropped[0]}=QUANTITY",
+        f"or --column {dropped[0]}=QUANTITY on the command line",
     )
 
 

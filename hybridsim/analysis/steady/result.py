@@ -141,7 +141,7 @@ class SteadyState(Readable, Measures):
         if not self.success:
             raise UsageError(
                 f"the motion is {self.kind}: a motion without a period has no multipliers",
-                remedy="use `lyapunov` instead",
+                remedy="use the attribute `lyapunov` instead",
             )
         rates = rates_at_end(self.solution) if self._is_free else None
         found = derivatives(self.solution, ())

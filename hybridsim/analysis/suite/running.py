@@ -107,7 +107,7 @@ def _chosen(names: Sequence[str] | None) -> tuple[Scene, ...]:
     for name in names:
         known_name(name, scene_names(), "the suite has no scene", "scenes")
     if not names:
-        raise UsageError("no scenes to run", remedy=f"use some of {', '.join(scene_names())}")
+        raise UsageError("the list of scenes is empty", remedy=f"use some of {', '.join(scene_names())}")
     return tuple(scene for scene in SCENES if scene.name in names)
 
 

@@ -105,7 +105,7 @@ class Journal:
             except (ValueError, OverflowError, RecursionError) as error:
                 raise UsageError(
                     f"{self.path}, line {number} is not a result of a sweep: {error}",
-                    remedy="remove the line, or delete the file",
+                    remedy="remove this line from the file, or delete the file",
                 ) from error
         self._file.truncate(end)
 

@@ -64,7 +64,7 @@ def add_to(commands: Any) -> None:
         values.positive,
     )
     parser.add_argument(
-        "--no-integrators", action="store_true", help="do not compare settings of the integrators"
+        "--no-integrators", action="store_true", help="do not search for the cheapest integrator setting"
     )
     options.add_workers(parser, " for --over")
     options.add_budget(parser, "120; unlimited with --over")

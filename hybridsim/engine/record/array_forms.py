@@ -65,7 +65,7 @@ def check_ascending(title: str, array: np.ndarray, *, strictly: bool = False) ->
 def check_modes(title: str, modes: np.ndarray, counts: Sequence[int], lowest: int = 0) -> None:
     """Raise an error for mode numbers that the components do not have."""
     if not ((modes >= lowest) & (modes < np.asarray(counts, dtype=np.int64))).all():
-        raise ValueError(f"{title} is not a mode of its component")
+        raise ValueError(f"{title} contains a number that is not a mode of its component")
 
 
 def check_instant(title: str, instant: object) -> tuple[float, float]:

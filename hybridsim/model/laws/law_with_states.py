@@ -124,7 +124,7 @@ def _indices(contact: Contact, values: Mapping[str, Expression]) -> list[int | N
         count = 0
     if not 0 < count <= MOST_COPIES:
         raise contact.error(
-            f"contact {contact.name}: the law '{law.name}' cannot have {law.copies} = {copies.text} copies",
+            f"contact {contact.name}: the number of copies, {law.copies}, cannot be {copies.text}",
             f"write a whole number from 1 to {MOST_COPIES}, not an expression, because each copy adds states",
         )
     return list(range(1, count + 1))

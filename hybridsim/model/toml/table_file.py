@@ -15,13 +15,13 @@ MAX_BYTES = 64_000_000
 
 
 def numbers_from_file(
-    table: Table, folder: Path, keys: tuple[str, str], what: str
+    table: Table, folder: Path, keys: tuple[str, str], first_title: str
 ) -> dict[str, tuple[float, ...]]:
     """Read the columns of a table from a CSV file, and return the numbers under the two given keys.
 
     Parameters
     ----------
-    what : the word for the numbers of the first column.
+    first_title : the word for the numbers of the first column.
     may_lack : whether empty cells and "nan" become NaN, except in the first column.
     """
     for key in keys:
@@ -30,12 +30,12 @@ def numbers_from_file(
     columns = table.data.get("columns")
     is_pair = isinstance(columns, list) and len(columns) == 2
     if columns is not None and not (is_pair and all(isinstance(column, (str, int)) for column in columns)):
-        remedy = f"use two names or indices, [{what}, values]"
+        remedy = f"use two names or indices, [{first_title}, values]"
         table.fail(f"'columns' cannot be {columns!r}", remedy, "columns")
         return {}
     path = folder / table.text("file")
     try:
-        found = read_columns(path, columns, what)
+        found = read_columns(path, columns, first_title)
     except ModelError as fault:
         where = fault.place.prefix if fault.place else ""
         remedy = f"{fault.remedy}; paths are relative to the folder {folder.resolve()}"
@@ -46,7 +46,7 @@ def numbers_from_file(
 
 
 def read_columns(
-    path: Path, columns: Sequence[str | int] | None, what: str = "times", may_lack: bool = False
+    path: Path, columns: Sequence[str | int] | None, first_title: str = "times", may_lack: bool = False
 ) -> tuple[tuple[float, ...], ...]:
     """Return two columns of a CSV file as numbers: times (or arguments), which may not decrease, and values.
 
@@ -57,7 +57,7 @@ def read_columns(
     Parameters
     ----------
     columns : name, or index from 0, of each selected column; None for a file with two columns of numbers.
-    what : the word for the numbers of the first column.
+    first_title : the word for the numbers of the first column.
 
     Raises
     ------
@@ -70,7 +70,7 @@ def read_columns(
     has_choice, columns = columns is not None, columns or (0, 1)
     names = head if _are_names(head, columns) else None
     if len(rows) < (2 if names else 1):
-        remedy = f"write {what} in the first column and values in the second"
+        remedy = f"write {first_title} in the first column and values in the second"
         raise ModelError("the table has no rows of numbers", place=Place(str(path)), remedy=remedy)
     _refuse_decimal_commas(rows, names, path)
     _refuse_spaces(rows, path)
@@ -81,7 +81,7 @@ def read_columns(
         raise ModelError(
             f"the table has {len(numeric)} columns of numbers: {which}",
             place=Place(str(path), body[0][0]),
-            remedy=f"choose the {what} and the values with `columns`",
+            remedy=f"choose the {first_title} and the values with `columns`",
         )
     indices = [_index(column, names, len(head), Place(str(path), rows[0][0])) for column in columns]
     found = tuple(
@@ -91,8 +91,10 @@ def read_columns(
     first = found[0]
     for (line, _), before, after in zip(body[1:], first[:-1], first[1:], strict=True):
         if after < before:
-            message = f"the {what} decrease from {before!r} to {after!r}"
-            raise ModelError(message, place=Place(str(path), line), remedy=f"sort the rows by the {what}")
+            message = f"the {first_title} decrease from {before!r} to {after!r}"
+            raise ModelError(
+                message, place=Place(str(path), line), remedy=f"sort the rows by the {first_title}"
+            )
     return found
 
 

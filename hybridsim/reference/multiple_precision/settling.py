@@ -217,7 +217,7 @@ class Rules:
                 scores.setdefault((len(set(unchanged) - deciding), len(unchanged), held), []).append(trial)
         best = scores[max(scores)] if scores else []
         if len(best) != 1:
-            what = "several motions are" if best else "no motion is"
+            motions = "several motions are" if best else "no motion is"
             names = ", ".join(self.components[c].name for c in chosen)
-            raise SimulationError(f"at t = {float(point.t)!r} {what} admissible for {names}")
+            raise SimulationError(f"at t = {float(point.t)!r} {motions} admissible for {names}")
         return best[0]

@@ -207,22 +207,22 @@ def check_checkpoint(header: Header, arrays: Arrays, system: System, span: tuple
 
 
 def _check_pace(row: object, components: int) -> None:
-    what = "the pace of a component"
+    entry = "the pace of a component"
     if not (isinstance(row, list) and len(row) == 2 and isinstance(row[1], list) and len(row[1]) == 5):
-        raise ValueError(f"{what} cannot be {row!r}")
+        raise ValueError(f"{entry} cannot be {row!r}")
     component, (last, intervals, longest, forecast, steadiest) = row
     if type(component) is not int or not _NOBODY <= component < components:
-        raise ValueError(f"{what} refers to the unknown component {component!r}")
+        raise ValueError(f"{entry} refers to the unknown component {component!r}")
     if last is not None:
-        check_instant(what, last)
+        check_instant(entry, last)
     if not isinstance(intervals, list) or len(intervals) > _MOST_INTERVALS:
-        raise ValueError(f"{what} has invalid intervals: {intervals!r}")
+        raise ValueError(f"{entry} has invalid intervals: {intervals!r}")
     for value in (*intervals, longest):
-        check_number(what, value, 0.0)
+        check_number(entry, value, 0.0)
     for values, count in ((forecast, 2), (steadiest, 3)):
         if values is None:
             continue
         if not isinstance(values, list) or len(values) != count:
-            raise ValueError(f"{what} cannot be {values!r}")
+            raise ValueError(f"{entry} cannot be {values!r}")
         for value in values:
-            check_number(what, value, is_finite=False)
+            check_number(entry, value, is_finite=False)

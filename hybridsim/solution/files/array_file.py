@@ -42,8 +42,8 @@ def open_regular(name: str, remedy: str) -> IO[bytes]:
     except (OSError, ValueError) as fault:
         if isinstance(fault, UsageError):
             raise
-        why = getattr(fault, "strerror", None) or fault
-        raise UsageError(f"{name} cannot be read: {why}", remedy=remedy) from fault
+        reason = getattr(fault, "strerror", None) or fault
+        raise UsageError(f"{name} cannot be read: {reason}", remedy=remedy) from fault
 
 
 def read_arrays(file: IO[bytes]) -> dict[str, np.ndarray]:

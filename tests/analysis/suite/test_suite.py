@@ -193,7 +193,7 @@ def test_a_reference_that_takes_too_long_is_replaced_and_that_is_said() -> None:
     "keywords, message",
     [
         ({"scenes": ["P3"]}, "no scene 'P3'"),
-        ({"scenes": []}, "no scenes"),
+        ({"scenes": []}, "the list of scenes is empty"),
         ({"budget": 0.0}, "`budget` cannot be 0.0"),
         ({"repeat": 0}, "`repeat` cannot be 0"),
         ({"integrators": ["cvode-bfd"]}, "cvode-bfd"),

@@ -68,7 +68,7 @@ def _taken_over(journal: Journal, collected: Collected, chains: int | None) -> n
         if not (numbers and in_range and len(numbers) == len(outcomes)):
             raise UsageError(
                 f"{journal.path}, line {line}: {numbers!r} are not among the {total} points of this sweep",
-                remedy="remove the line, or delete the file",
+                remedy="remove this line from the file, or delete the file",
             )
         known[numbers] = True
         if chains is None or len(outcomes) == len(range(numbers[0], total, chains)):
