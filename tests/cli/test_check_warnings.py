@@ -130,13 +130,13 @@ def test_starts_on_a_guard_and_loads_that_can_vanish_are_noted(hybridsim: Callab
     code, out, _ = hybridsim("check", "noted.toml", "--json")
     assert code == 0
     assert json.loads(out)["notes"] == [
-        "the relative velocity of contact f (u - 1) is zero at the start: the forces decide whether it sticks",
-        "the gap of impact q (x - a - b) is zero at the start: its time derivatives decide whether it is closed",
+        "the relative velocity of contact f (u - 1) is zero at the start: the forces decide whether the contact sticks",
+        "the gap of impact q (x - a - b) is zero at the start: its time derivatives decide whether the gap is closed",
         "guard even of mode one, component mode (x - (a + b)) is zero at the start: "
-        "its first nonzero time derivative decides whether it fires immediately",
+        "its first nonzero time derivative decides whether the guard fires immediately",
         "the normal load of contact f (k*max(-y, 0)) can reach zero: friction is then zero until the load is positive "
         "again",
-        "the normal load of contact g (y) can become negative: the contact opens when it reaches zero",
+        "the normal load of contact g (y) can become negative: the contact opens when the load reaches zero",
     ]
     text = hybridsim("check", "noted.toml")[1]
     assert "\nnotes\n  the relative velocity of contact f (u - 1) is zero at the start" in text

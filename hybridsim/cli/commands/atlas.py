@@ -27,7 +27,8 @@ def add_to(commands: Any) -> None:
         "atlas",
         help="run all integrators on benchmark problems (scenes) and report failures",
         description="Run benchmark problems (scenes) with known answers, with every integrator and with other common "
-        "methods. Report for each pair: right, wrong answer, wrong mode sequence, hang (bounded) or refused.",
+        "methods. Report for each pair: right, wrong answer, wrong mode sequence, hang (bounded by a time limit), or "
+        "refused.",
         epilog="The folder receives atlas.json, matrix.png, index.md, and a page and a folder of pictures for each "
         "class. A full run takes about ten minutes on two processors.",
     )

@@ -26,8 +26,8 @@ def add_to(commands: Any) -> None:
     parser = commands.add_parser(
         "fit",
         help="fit parameters of a model to measurements",
-        description="Fit parameters and start values to CSV files. The first line of a file names its columns: "
-        "t and quantities of the model. Each file is one experiment.",
+        description="Fit parameters and start values to measurements in CSV files. The first line of a file names its "
+        "columns: t and quantities of the model. Each file is one experiment.",
         epilog=_EXAMPLES,
     )
     options.add_model_arguments(parser)

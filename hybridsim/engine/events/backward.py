@@ -54,7 +54,7 @@ def has_no_past(
     resets = [model.schedules[k].name for k in schedules if model.schedules[k].reset]
     resets += [system.monitor_names[k] for k in stopping if model.monitors[k].reset]
     if resets:
-        return f"the reset of {', '.join(resets)} cannot be inverted, so the past before it is not unique"
+        return f"the reset of {', '.join(resets)} cannot be inverted, so the past of this event is not unique"
     return entered_here(system, z, fired)
 
 
@@ -105,6 +105,8 @@ def cross_backward(system: System, at: Situation, fired: tuple[int, ...]) -> Out
         could_rest = forward.verdict(rest, [c]) != LEAVES
         if outcome.status or could_rest or outcome.z[c] != other:
             outcome.status = "backward-nonunique"
-            outcome.message = f"{automaton.name} reaches a surface at which its past is not unique"
+            outcome.message = (
+                f"{automaton.name} reaches a surface at which the past of the motion is not unique"
+            )
             break
     return outcome

@@ -71,13 +71,13 @@ def _starts(model: Model, component: Component, start: _Start) -> Iterator[str]:
         text = surface.function.text
         if surface.is_unilateral:
             yield (
-                f"the gap of impact {name} ({text}) is zero at the start: its time derivatives decide whether it is "
-                "closed"
+                f"the gap of impact {name} ({text}) is zero at the start: its time derivatives decide whether "
+                "the gap is closed"
             )
         elif any(contact.name == name for contact in model.contacts):
             yield (
                 f"the relative velocity of contact {name} ({text}) is zero at the start: "
-                "the forces decide whether it sticks"
+                "the forces decide whether the contact sticks"
             )
         else:
             yield (
@@ -89,7 +89,7 @@ def _starts(model: Model, component: Component, start: _Start) -> Iterator[str]:
             if start.is_zero(guard.expr):
                 yield (
                     f"guard {guard.name} of mode {component.initial}, component {name} ({guard.expr.text}) is zero at "
-                    "the start: its first nonzero time derivative decides whether it fires immediately"
+                    "the start: its first nonzero time derivative decides whether the guard fires immediately"
                 )
 
 
@@ -100,7 +100,7 @@ def _loads(model: Model, meanings: Meanings) -> Iterator[str]:
         tree = meanings.written_out(contact.normal.tree)
         load = f"the normal load of contact {contact.name} ({contact.normal.text})"
         if contact.opens:
-            yield f"{load} can become negative: the contact opens when it reaches zero"
+            yield f"{load} can become negative: the contact opens when the load reaches zero"
             continue
         if not meanings.moves(tree) or is_clear_of_zero(tree, numbers, meanings):
             continue

@@ -114,5 +114,5 @@ def _force_along_velocity(
             return None
     return (
         f"the force of the law '{law.name}' acts in the direction of the velocity, so it drives the motion",
-        "a force that opposes the motion has the sign of v; correct its sign unless it is intended",
+        "a force that opposes the motion has the sign of v; correct its sign, unless this sign is intended",
     )

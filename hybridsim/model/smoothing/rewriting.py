@@ -200,7 +200,7 @@ class Rewriting(RewritingState):
             self._is_limited(side, argument, family, s)
             for side, s in zip(branches, (sign, -sign), strict=False)
         ):
-            reason = "one of its sides is undefined on the other side"
+            reason = "the expression for one sign is undefined for the other sign"
             return self._unchanged(node, reason if agrees else f"{JUMPS}: {reason}", here)
         if family in here.signs:
             return self._implied(node, (below, on_border, above)[here.signs[family] * sign + 1], here)

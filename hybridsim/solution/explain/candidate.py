@@ -134,7 +134,9 @@ def as_in(system: System, z: np.ndarray, expression: Expression) -> Expression:
 def _readable(text: str, component: str) -> str:
     """Return the expression of a guard as readable text, without internal names."""
     if text.startswith(ATTRACTION):
-        return f"attraction of {component}, half the sum of the rates at which its two sides approach it"
+        return (
+            f"attraction of {component}, half the sum of the rates at which both sides approach the surface"
+        )
     return re.sub(rf"{SIGN}\d+", component, text)
 
 

@@ -237,7 +237,7 @@ def _without_a_segment(solution: Solution, event: Event) -> str:
         )
     if not solution.success and event.t == solution.t[-1]:
         return f"the run ended here: {solution.message}"
-    return "it followed the earlier events of this instant immediately: no time passed in between"
+    return "the change followed the earlier events of this instant immediately: no time passed between them"
 
 
 def _without_guards(solution: Solution, event: Event, together: list[Occurrence]) -> str:

@@ -62,7 +62,7 @@ def reason(
         if impact_guard is not None:
             return leads
         subject = led.subject or "another event of this instant"
-        return f"{subject} made the guard leave: it was not at zero before; {leads}"
+        return f"{subject} made the guard negative (it was not at zero before); {leads}"
     if decision is None:
         return f"{led.start or 'at this instant: '}{occurrence.target} from here on"
     return led.start + _decided(system, decision, c)
@@ -143,7 +143,7 @@ def _decided(system: System, decision: Decision, c: int) -> str:
             return f"{way(system, fine[0])} together: {alone}"
         return f"{whose} is the only mode that is admissible just after"
     what = f"{way(system, fine[0])} together" if is_joint else whose
-    return f"{what}: taken, as it is certain to be admissible; {_open(system, undecided, fine[0])}"
+    return f"{what}: taken, because it is certainly admissible; {_open(system, undecided, fine[0])}"
 
 
 def _of_several(system: System, decision: Decision) -> str:

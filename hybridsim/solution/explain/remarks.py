@@ -152,7 +152,7 @@ def _loads(solution: Solution, t: float) -> Iterator[str]:
         was_zero, is_zero = (load == 0.0 or (contact.opens and load < 0.0) for load in (before, after))
         load = f"the normal load of contact {contact.name} ({contact.normal.text})"
         if is_zero and not was_zero:
-            yield f"{load} reaches zero here, and friction ends until it is positive again"
+            yield f"{load} reaches zero here, and friction ends until the load is positive again"
         elif was_zero and not is_zero:
             yield f"{load} leaves zero here, and friction begins again"
         elif not is_zero and abs(here) <= LOCATED * UNIT * max(abs(before), abs(after)):

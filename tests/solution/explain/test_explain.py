@@ -152,7 +152,7 @@ def test_joint_decisions_and_schedules_are_named() -> None:
     assert any("so: c1 stick, c2 stick, c3 slip+ together" in text for text in texts)
     assert not any("is undecided" in text for text in texts)  # the load of a clutch that is not engaged is 0
     assert not any("changed the mode by its own rule" in text for text in texts)
-    assert "the rates at which its two sides approach it" in str(
+    assert "the rates at which both sides approach the surface" in str(
         hs.simulate("relay-pair", (0.0, 1.0)).explain(0)
     )
 
@@ -288,7 +288,7 @@ def test_a_guard_that_a_reset_moved_is_not_told_as_located(integrator: str, targ
         assert (view.mode, view.guard) == ("a p", "g") and view.bounds[0] < 1e-14
     assert moving.reason == f"guard g leads to q, with y from 8.5 to {target}"
     assert moved.reason == (
-        f"the reset of guard g of a (y from 8.5 to {target}) made the guard leave: it was not at zero before; "
+        f"the reset of guard g of a (y from 8.5 to {target}) made the guard negative (it was not at zero before); "
         "guard h leads to s, with x from 0.5 to 3"
     )
 

@@ -132,9 +132,9 @@ def test_a_corner_without_an_event_can_be_explained() -> None:
 @pytest.mark.parametrize(
     ("load", "opens", "sentence"),
     [
-        ("2*max(-h, 0)", False, "reaches zero here, and friction ends until it is positive again"),
-        ("abs(h) - h", False, "reaches zero here, and friction ends until it is positive again"),
-        ("-h", True, "reaches zero here, and friction ends until it is positive again"),
+        ("2*max(-h, 0)", False, "reaches zero here, and friction ends until the load is positive again"),
+        ("abs(h) - h", False, "reaches zero here, and friction ends until the load is positive again"),
+        ("-h", True, "reaches zero here, and friction ends until the load is positive again"),
         ("2*max(h, 0)", False, "leaves zero here, and friction begins again"),
         ("h", True, "leaves zero here, and friction begins again"),
         ("3*abs(h)", False, "touches zero here"),
@@ -160,7 +160,7 @@ def test_a_reaction_that_ends_unloads_the_friction() -> None:
     )
     sol = hs.simulate(model, (0, 1), integrator="taylor")
     assert sol.explain(0).remarks == (
-        "the normal load of contact f (p) reaches zero here, and friction ends until it is positive again",
+        "the normal load of contact f (p) reaches zero here, and friction ends until the load is positive again",
     )
 
 

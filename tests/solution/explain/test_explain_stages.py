@@ -153,7 +153,7 @@ def test_a_decision_that_leads_to_another_one_at_its_instant(integrator: str) ->
     assert values(stopped)["f stick", "lower"] == pytest.approx(3.0)
     assert values(turned)["f stick", "lower"] == pytest.approx(3.0 - 5.0)
     assert stopped.reason == "f stick is the only mode that is admissible just after"
-    assert "made the guard leave: it was not at zero before; guard on leads to on" in switched.reason
+    assert "made the guard negative (it was not at zero before); guard on leads to on" in switched.reason
     assert turned.reason.startswith("guard on of sw led to on: f slip- is the only mode")
 
 
@@ -175,8 +175,8 @@ def test_a_guard_that_a_schedule_moved() -> None:
     )
     moved = why(hs.simulate(model, (0, 2)), "sw", "on")
     assert not moved.fired and moved.reason == (
-        "push was due at this instant and set F from 0 to -5, which made the guard leave: it was not at zero before; "
-        "guard on leads to on"
+        "push was due at this instant and set F from 0 to -5, which made the guard negative (it was not at zero "
+        "before); guard on leads to on"
     )
 
 
@@ -330,7 +330,7 @@ def test_never_the_only_one_where_another_is_open(integrator: str) -> None:
     released = sol.explain(0)
     if seen(released).get(("slip+", "slip-")) == ("a question of rounding", False):
         assert released.reason == (
-            "f slip+, q stick together: taken, as it is certain to be admissible; (f slip+, q slip-) is a question of "
+            "f slip+, q stick together: taken, because it is certainly admissible; (f slip+, q slip-) is a question of "
             "rounding: the same motion to rounding"
         )
     else:

@@ -133,7 +133,8 @@ def refused(resolution: EventVerdicts, members: list[int], message: str) -> tupl
     if (pull < 0.0).any():
         names = ", ".join(system.automata[c].name for c, own in zip(unique, pull, strict=True) if own < 0.0)
         return "nonunique", (
-            f"{message}; {names} drives the motion away from its surface, so the motion that leaves it is not unique"
+            f"{message}; {names} drives the motion away from its surface, so the motion that leaves this surface is "
+            "not unique"
         )
     return "inconsistent", message
 
