@@ -180,5 +180,5 @@ def _refuse_dependent(system: Any, z: np.ndarray) -> None:
         names = ", ".join(system.automata[system.surface_of[k]].name for k in held)
         raise UsageError(
             f"`z` holds {names} at once, but these gaps depend on each other and cannot all be kept at zero",
-            remedy="open one of them in `z`",
+            remedy="open one of these gaps in `z`",
         )

@@ -28,7 +28,7 @@ _OF_MODELS = {
 }
 _OF_MOREAU = ("steps_per_period", "period", "step", "theta", "tolerance", "iterations")
 
-_INDEPENDENT = "(possible if the directions of its contacts and gaps are linearly independent)"
+_IF_INDEPENDENT = "(possible if the directions of its contacts and gaps are linearly independent)"
 
 
 def simulate_mechanical(
@@ -60,12 +60,12 @@ def simulate_mechanical(
         integrator_class(name)  # refuses unknown integrators
         raise UsageError(
             f"{name} cannot simulate a MechanicalSystem",
-            remedy=f"use integrator='taylor', or simulate system.to_model() with {name} {_INDEPENDENT}",
+            remedy=f"use integrator='taylor', or simulate system.to_model() with {name} {_IF_INDEPENDENT}",
         )
     if system.impacts and name != "moreau":
         raise UsageError(
             f"{name} cannot simulate a MechanicalSystem with impacts",
-            remedy=f'use integrator="moreau", step=..., or convert a small system by to_model() {_INDEPENDENT}',
+            remedy=f'use integrator="moreau", step=..., or convert a small system by to_model() {_IF_INDEPENDENT}',
         )
     method: Any = None
     if name == "moreau":

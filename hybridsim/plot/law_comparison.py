@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def law_comparison(comparison: LawComparison) -> tuple[Axes, Axes]:
-    """Draw the force of the contact over the quantity for each law, and a measure of each run as bars.
+    """Draw the contact force over a quantity of the model for each law, and a measure of each run as bars.
 
     The bars show the first reading of the comparison, or the amplitude. A complex reading is drawn as its magnitude.
     The area of a loop is the energy loss per period if the quantity is the relative displacement.

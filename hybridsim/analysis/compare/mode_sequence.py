@@ -95,7 +95,7 @@ def _left_over(entries: Sequence[_Entry], matched: set[int]) -> list[float]:
 
 
 def _sequences(trajectory: Trajectory) -> dict[tuple[str, str], list[_Entry]]:
-    """Return a sequence of entries for each component, monitor and schedule."""
+    """Return the modes of each component, and the events of each monitor and schedule, in order of time."""
     t0 = trajectory.t_span[0]
     sequences = {
         ("transition", component): [_Entry(t0, mode, None)]

@@ -147,7 +147,7 @@ class SteadyState(Readable, Measures):
         found = derivatives(self.solution, ())
         if found.warnings:
             raise UsageError(
-                f"the motion has no multipliers: {found.warnings[0].partition(',')[0]}, and its two sides part later",
+                f"the motion has no multipliers: {found.warnings[0].partition(',')[0]}, and its two sides differ later",
                 remedy="use other parameters, or hs.simulate from starts on both sides",
             )
         return multipliers(found.by_start, rates)

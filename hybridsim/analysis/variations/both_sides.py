@@ -45,7 +45,7 @@ class OneSide:
         return found
 
     def differing(self) -> list[tuple[str, np.ndarray]]:
-        """Return the functions at zero whose two sides part later, each with a mask (M,) of directions."""
+        """Return the functions at zero whose two sides differ later, each with a mask (M,) of directions."""
         return [(_zero_text(one), one.moves) for one in self._carried.off if one.parts]
 
 

@@ -257,7 +257,7 @@ class Carrier:
     def _followed(
         self, number: int, Y: np.ndarray, Yd: np.ndarray, G: np.ndarray, shift: np.ndarray
     ) -> np.ndarray:
-        """Return the derivatives at the start of a segment, corrected by functions that stay zero or leave it there."""
+        """Return the derivatives at the start of a segment, corrected for functions that are zero there."""
 
         def over(stops: np.ndarray) -> np.ndarray:
             return self._flow.over(number, Y, Yd, G, stops)

@@ -57,7 +57,7 @@ def differ(one: np.ndarray, other: np.ndarray) -> bool:
 
 
 def off_zero(changes: Changes, at: Place) -> tuple[np.ndarray, list[OffZero], list[ZeroFunction]]:
-    """Return the derivatives, corrected by constraints, the functions at zero, and those of them without a rate."""
+    """Return the derivatives corrected by constraints, the functions at zero, and those of them with zero rate."""
     sides = _Sides(changes, at)
     off = sides.surfaces()
     return sides.at.Y, off + sides.guards(), sides.staying
@@ -225,7 +225,7 @@ class _Sides:
         return [self.off(name, one, other, there, 0.0)]
 
     def _stays(self, c: int, i: int, noted: np.ndarray) -> None:
-        """Store a guard that is zero without a rate, if a change may fire it later."""
+        """Store a guard that is zero with zero rate, if a small change may fire this guard later."""
         automaton, m = self.system.automata[c], int(self.at.z[c])
         choice = self.system.choose(c, m, i, self.at.s, self.at.x, self.at.p, self.at.z)
         if choice < 0:

@@ -184,7 +184,7 @@ def terms_of(node: ast.expr) -> Iterator[ast.expr]:
 
 
 def factors_of(node: ast.expr, sign: int = 1) -> Iterator[tuple[ast.expr, int]]:
-    """Yield the factors of a product with 1, and its divisors with -1."""
+    """Yield the factors of a product with the exponent 1, and its divisors with the exponent -1."""
     match node:
         case _ if is_number(node):
             yield node, sign

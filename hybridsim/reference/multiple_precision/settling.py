@@ -203,7 +203,7 @@ class Rules:
         return surface is not None and modes[c] == surface.hold
 
     def _best(self, point: Point, modes: Modes, chosen: Sequence[int], deciding: set[int]) -> Modes:
-        """Return the admissible modes with the fewest changes, above all of components without an event."""
+        """Return the admissible modes with the fewest changes; changes of components without an event count most."""
         scores: dict[tuple[int, int, int], list[Modes]] = {}
         for combination in itertools.product(*([m.name for m in self.components[c].modes] for c in chosen)):
             candidate = list(self.programs.decided(modes))

@@ -1,4 +1,4 @@
-"""This module finds monitors that are zero at a place of a run and would act after a small change of the run."""
+"""This module finds monitors that are zero at a point of a run and would act after a small change of the run."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from hybridsim.engine.record.segments import Segment
 def monitors_reached(
     changes: Changes, at: Place, segment: Segment, numbers: Sequence[int]
 ) -> tuple[list[OffZero], list[int]]:
-    """Return the monitors at zero that would act after a small change, and the numbers of those that stay zero.
+    """Return the monitors at zero that would act after a small change, and the numbers of monitors that stay zero.
 
     at : the start of the segment; one step later the monitor shows its side if its rate is zero. numbers : of the
     monitors to judge.

@@ -23,7 +23,7 @@ Arguments = tuple[Dual, list[Dual], list[Any]]
 
 
 class ResetCorners:
-    """Compares the values that resets set a little beside a point, in both senses of each direction.
+    """Compares the values that resets set at small distances from a point, in both senses of each direction.
 
     reset : the compiled resets. own (M,) : the change along each direction that is as large as the quantity itself.
     """
@@ -36,7 +36,7 @@ class ResetCorners:
     def beside(
         self, key: tuple[Any, ...], arguments: Arguments, z: np.ndarray, before: list[Any]
     ) -> np.ndarray:
-        """Return a mask (M,) of the directions in which the reset with a key has a corner.
+        """Return a mask (M,) of the directions in which the reset with the given key has a corner.
 
         before : the values before the reset, with derivatives.
         """

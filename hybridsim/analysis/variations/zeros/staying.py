@@ -1,4 +1,4 @@
-"""This module follows guards and surfaces that are zero without a rate, so that a small change leaves them off zero.
+"""This module follows guards and surfaces that are zero with zero rate, so that a small change makes them nonzero.
 
 Such a function g may stay zero for a time. A change that moves it to its other side then runs in other modes. If the
 rates or their derivatives differ there before the run leaves the zero, the run on the other side is another one.
@@ -39,7 +39,7 @@ Over = Callable[[np.ndarray], np.ndarray]
 
 
 class Staying:
-    """The functions, and the numbers of the monitors, that are zero without a rate at an instant of a run."""
+    """The functions, and the numbers of the monitors, that are zero with zero rate at an instant of a run."""
 
     def __init__(self) -> None:
         self.zeros: list[ZeroFunction] = []
@@ -49,13 +49,13 @@ class Staying:
         return bool(self.zeros or self.monitors)
 
     def settle(self, zeros: list[ZeroFunction]) -> None:
-        """Replace the functions after an event with a jump, except those with directions that left for good."""
+        """Replace the functions after an event with a jump; keep those with directions that never return to zero."""
         self.zeros = [one for one in self.zeros if one.gone is not None] + zeros
 
     def follow(
         self, changes: Changes, segment: Segment, Yd: np.ndarray, shift: np.ndarray, over: Over
     ) -> list[OffZero]:
-        """Follow everything along a segment, and return the effects on the derivatives."""
+        """Follow the functions and monitors along a segment, and return the effects on the derivatives."""
         if not self or len(segment.s) < 2:
             return []
         follower = Follower(changes, segment, Yd, shift, over)
@@ -67,7 +67,7 @@ class Staying:
     def at_resets(
         self, changes: Changes, at: Place, rounds: Rounds, ran: Callable[[np.ndarray], Rounds]
     ) -> list[OffZero]:
-        """Return the functions on whose other side the resets of an instant have other results.
+        """Return the functions for which the resets of an instant have different results on the two sides of zero.
 
         at : the place just before the instant. rounds : its resets. ran : repeats them in other modes before it.
         """
@@ -91,7 +91,7 @@ class Follower:
         self._Yd, self._shift = Yd, shift
 
     def follow(self, zero: ZeroFunction) -> tuple[ZeroFunction | None, list[OffZero]]:
-        """Return the function if it is still to be followed after the segment, and its effects on the derivatives."""
+        """Return the function to follow after the segment, or None, and its effects on the derivatives."""
         mode, width = int(self._segment.z[zero.c]), self._changes.G.shape[1]
         if zero.gone is not None:
             return self._gone(zero, mode)
@@ -112,7 +112,7 @@ class Follower:
         return seen._replace(noted=seen.noted | moves), self._off(seen, moves, lost)
 
     def _gone(self, zero: ZeroFunction, mode: int) -> tuple[ZeroFunction | None, list[OffZero]]:
-        """Compare the run with a run that is in another mode for good."""
+        """Compare the run with a changed run that stays in another mode."""
         assert zero.gone is not None
         if mode == zero.there:
             return None, []
@@ -124,7 +124,7 @@ class Follower:
         return (zero._replace(gone=rest) if rest.any() else None), self._off(zero, parted, parted)
 
     def _leaving(self, zero: ZeroFunction, at: Place, one: Changed) -> list[OffZero]:
-        """Return the effects of a function that leaves its zero at the start of the segment."""
+        """Return the effects of a function that becomes nonzero at the start of the segment."""
         if zero.back >= 0:
             return []  # both sides of a corner agree to a higher order than its function
         ahead = self._order(zero, at, zero.here)[0]
@@ -178,7 +178,7 @@ class Follower:
         return moved, moved & (_side(self._system, zero) * one.by < 0.0)
 
     def _parted(self, zero: ZeroFunction, at: Place) -> np.ndarray:
-        """Return a mask (M,) of the directions in which a run on the other side differs at one place."""
+        """Return a mask (M,) of the directions in which a run on the other side of zero differs at the point `at`."""
         system, z = self._system, _other_side(zero, at)
         if zero.surface < 0 and zero.back < 0 and zero.gone is None:
             return np.ones(at.Y.shape[1], dtype=bool)
@@ -205,7 +205,7 @@ class Follower:
         return np.asarray((np.abs(moved[0] - moved[1]) > _SAME * sizes.sum(axis=0)).any(axis=0))
 
     def at_start(self) -> Place:
-        """Return the place at the start of the segment."""
+        """Return the point at the start of the segment."""
         return next(self._along(np.zeros(1)))
 
     def _along(self, fractions: np.ndarray) -> Iterator[Place]:
@@ -217,7 +217,7 @@ class Follower:
             yield Place(s, float(segment.origin), x, segment.p, segment.z, Y, Yd, fixed, np.abs(Y))
 
     def _moving(self, at: Place) -> Place:
-        """Return a place that moves with the start of the segment."""
+        """Return a point that moves with the start of the segment."""
         rates = rates_of(self._system, at.s, at.x, at.p, at.z)
         return replace(at, Y=at.Y + np.outer(rates, self._shift), shift=self._shift)
 
@@ -271,13 +271,13 @@ def _value(changes: Changes, zero: ZeroFunction, at: Place) -> Changed:
 
 
 def _side(system: System, zero: ZeroFunction) -> float:
-    """Return the sign of the function on the side of the run."""
+    """Return the sign of the function on the side of zero that the run takes."""
     is_below = zero.surface >= 0 and zero.here == system.automata[zero.c].below
     return -1.0 if is_below else 1.0
 
 
 def _other_side(zero: ZeroFunction, at: Place) -> np.ndarray:
-    """Return the modes on the other side of the function."""
+    """Return the modes on the other side of the function's zero."""
     z = at.z.copy()
     z[zero.c] = zero.there
     return z

@@ -1,4 +1,4 @@
-"""This module describes a guard or surface that is zero without a rate."""
+"""This module describes a guard or surface that is zero with zero rate."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from hybridsim.engine.system.system import System
 
 
 class ZeroFunction(NamedTuple):
-    """A guard or surface of component `c` that is zero without a rate, in the mode `here`.
+    """A guard or surface of component `c` that is zero with zero rate, in the mode `here`.
 
     there : the mode on its other side. guard, back : numbers of the guards between the two modes; back is -1 if the
     component does not return. surface : number of the surface, or -1 for a guard. noted : mask (M,) of the directions
@@ -28,7 +28,7 @@ class ZeroFunction(NamedTuple):
     gone: np.ndarray | None = None
 
     def seen_from(self, mode: int) -> ZeroFunction | None:
-        """Return the function with `here` as the given mode, or None if it does not belong to this mode."""
+        """Return the function with `here` as the given mode, or None if the function does not belong to this mode."""
         if mode == self.here:
             return self
         if mode != self.there or (self.surface < 0 and self.back < 0):

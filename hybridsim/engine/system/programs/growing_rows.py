@@ -38,7 +38,7 @@ class GrowingLists:
         self._starts.put(0, [0])
 
     def put(self, k: int, rows: Any) -> None:
-        """Write the list of number k after all earlier lists."""
+        """Append list k after all earlier lists, and store where the next list starts."""
         first = int(self._starts.up_to(k + 1)[k])
         self._rows.put(first, rows)
         self._starts.put(k + 1, [first + len(rows)])
