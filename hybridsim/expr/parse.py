@@ -33,6 +33,7 @@ _PRODUCT = (
     "write only the number and set the unit in the field 'unit', or write a product with '*', such as '2*x'"
 )
 _AS_IN_PYTHON = "use the syntax of Python, such as 'a*sin(omega*t) - c*v'"
+_NO_NAMES: frozenset[str] = frozenset()
 _ALLOWED = re.compile(r"[A-Za-z0-9_ +\-*/().,<>=!]")
 _ADVICE = {
     "^": "write a power with **, such as x**2",
@@ -167,7 +168,9 @@ def _of_number(number: float, place: Place | None) -> Expression:
     tree: ast.expr = ast.Constant(abs(number))
     if math.copysign(1.0, number) < 0.0:
         tree = ast.UnaryOp(ast.USub(), tree)
-    return Expression(repr(number), frozenset(), place, tree)
+    expr: Expression = object.__new__(Expression)  # the constructor of a frozen class takes longer
+    vars(expr).update(text=repr(number), names=_NO_NAMES, place=place, tree=tree)
+    return expr
 
 
 def require_names(expr: Expression, known: Iterable[str]) -> None:

@@ -12,9 +12,9 @@ from hybridsim.integrators.contract import Integrator
 from hybridsim.model import Model
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False)
 class Run:
-    """A prepared run, which `hybridsim.simulate` makes from its arguments.
+    """A prepared run, which `hybridsim.simulate` makes from its arguments; it never changes.
 
     Parameters
     ----------

@@ -267,6 +267,7 @@ class Emitter:
             "quantities": tuple(n for n, _ in self.quantities()),
             "resets": tuple((key, tuple(mapping)) for key, mapping in resets_of(program.model)),
             "effects_read": parameters_read(program, self.lowering.effects),
+            "rates_read": parameters_read(program, (*program.rates, *program.periods.values())),
             "tape": self._tape(guards),
         }
 

@@ -157,9 +157,12 @@ def _before(end: Instant, length: float, forward: bool) -> Instant:
     return Instant(float(end.plus(-length if forward else length)))
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False)
 class Task:
-    """The definition of a run: time span, initial state and modes, tolerances, and results to store."""
+    """The definition of a run: time span, initial state and modes, tolerances, and results to store.
+
+    A task never changes. The class is not frozen, because a frozen object takes three times as long to make.
+    """
 
     t0: float
     t1: float
@@ -173,7 +176,7 @@ class Task:
     successor: Any = None  # a stiff method (`hybridsim.engine.run.stepping.Method`), which may take over
     is_stepped: bool = False  # whether t1 is an instant of its own, at which the run leaves a checkpoint
     # set-ups of runs; a copy of the task has its own
-    setups: dict[str, Any] = field(init=False, compare=False, repr=False, default_factory=dict)
+    setups: dict[str, Any] = field(init=False, repr=False, default_factory=dict)
 
     @property
     def forward(self) -> bool:

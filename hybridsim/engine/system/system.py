@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -26,6 +26,9 @@ from hybridsim.model.parts.model import Model
 from hybridsim.model.smoothing.explicit_corners import smoothed
 from hybridsim.model.smoothing.steps_in_time import constant_inputs
 from hybridsim.model.toml.automata import SINGLE
+
+_MAX_CACHED = 64  # most cached rates per structure
+_NO_DISCRETE = np.zeros(0)
 
 
 class _Frame:
@@ -70,6 +73,7 @@ class _Frame:
         self.quantities: tuple[str, ...] = data["quantities"]
         # the parameters that `effects` read, or None if they read more than parameters
         self.effects_read: tuple[int, ...] | None = data["effects_read"]
+        self.rates_read = np.array(data["rates_read"], dtype=np.int64)  # the parameters that `rates_at` reads
         self.has_tape: bool = data["tape"] is not None  # whether the model consists of expressions
 
     def _guard_table(self) -> np.ndarray:
@@ -83,6 +87,21 @@ class _Frame:
         return table
 
 
+class _Rates(NamedTuple):
+    """The rates at which angles grow in time, at some values of the parameters that they depend on."""
+
+    exact: np.ndarray  # (R, 2), see `System.rates_at`
+    fastest: float
+    turning: tuple[tuple[int, list[float]], ...]  # place of each angle in the run-time vector, and its rate
+
+
+def _rates_at_values(system: System, _: bytes) -> _Rates:
+    exact = system.rates_at(system._base)
+    fastest = max(map(abs, exact[:, 0].tolist()), default=0.0)
+    return _Rates(exact, fastest, tuple(enumerate(exact.tolist(), system.layout.phases_at)))
+
+
+_rates_of = per_structure(_rates_at_values, most=_MAX_CACHED)
 _frame_of = per_structure(lambda system: _Frame(system.model, system.code.data))
 _registers_of = per_structure(lambda system: Registers(system.code.data["tape"], system.layout))
 _has_corners = per_structure(lambda system: has_corners(system.code.data["tape"]))
@@ -117,18 +136,19 @@ class System(_Frame):
     """
 
     def __init__(self, model: Model, as_written: bool = False) -> None:
-        self.written = model  # kept alive, because `system_cache` finds systems by its identity
-        self.model = model = model if as_written else smoothed(model)
-        self.code = compiled(model)
-        vars(self).update(vars(_frame_of(self)))
+        written, self.model = model, model if as_written else smoothed(model)
+        self.code = compiled(self.model)
+        self.__dict__ = vars(_frame_of(self)) | vars(self)
+        self.written = written  # kept alive, because `system_cache` finds systems by its identity
+        model = self.model
         self.values = model.parameter_values()
         self._base = np.array([*self.values.values(), *self.beyond_parameters])
-        self.exact_rates = self.rates_at(self._base)
-        self.rates = self.exact_rates[:, 0]
-        self.fastest = max(map(abs, self.rates.tolist()), default=0.0)
-        self._turning = tuple(enumerate(self.exact_rates.tolist(), self.layout.phases_at))
-        self._start, discrete = model.start_values(), model.discrete_values() if model.discrete else {}
-        self.discrete_start = np.array([*discrete.values()])  # in the order of the state vector
+        self.exact_rates, self.fastest, self._turning = _rates_of(self, self._base[self.rates_read].tobytes())
+        self._start, self.discrete_start = [*model.start_values().values()], _NO_DISCRETE
+        discrete: dict[str, float] = {}
+        if model.discrete:
+            discrete = model.discrete_values()
+            self.discrete_start = np.array([*discrete.values()])  # in the order of the state vector
         self.signals: tuple[Signal, ...] = ()
         if model.inputs:
             numbers = {**discrete, **constant_inputs(model), **self.values}
@@ -157,6 +177,12 @@ class System(_Frame):
         return tuple(part.name for parts in named for part in parts)
 
     @property
+    def rates(self) -> np.ndarray:
+        """Return the rates (R,) at which angles grow in time, rounded to doubles."""
+        rates: np.ndarray = self.exact_rates[:, 0]
+        return rates
+
+    @property
     def can_hold(self) -> bool:
         """Return whether some mode holds states on a surface."""
         return bool(self.pins or self.projected)
@@ -173,8 +199,10 @@ class System(_Frame):
 
     def start_state(self, overrides: Mapping[str, float]) -> np.ndarray:
         """Return the initial states in the order of the state vector."""
-        values = {**self._start, **overrides}
-        return np.array([values[n] for n in self.names], dtype=float)
+        start = np.array(self._start)
+        for name, value in overrides.items():
+            start[self.names.index(name)] = value
+        return start
 
     def vector(self, origin: Instant, discrete: np.ndarray, forward: bool = True) -> np.ndarray:
         """Return the run-time vector of a segment whose local time starts at `origin`."""

@@ -241,9 +241,9 @@ class Model(Declared):
         require_known(changes, positions, "parameter", self.name, partial(remedy_for_parameter, self))
         parameters, are_numbers = list(self.parameters), True
         for name in changes:
-            former = parameters[positions[name]]
-            parameters[positions[name]] = changed = former.with_value(changed_value(changes, name))
-            are_numbers = are_numbers and former.value.is_constant and changed.value.is_number
+            former, value = parameters[positions[name]], changed_value(changes, name)
+            parameters[positions[name]] = former.with_value(value)
+            are_numbers = are_numbers and former.value.is_constant and value.is_number
         if not are_numbers:
             return self._valued(parameters=tuple(parameters))
         known = {"_unnumbered": self._unnumbered, "_renumbered": self._renumbered.union(changes)}
@@ -283,12 +283,12 @@ class Model(Declared):
 
     def _valued(self, **parts: Any) -> Model:
         """Return a copy that differs only in values and shares all other results with the model."""
-        copy: Model = object.__new__(type(self))
-        known, _ = vars(copy), self._common  # which both models share
-        known.update(vars(self))
+        copy, _ = object.__new__(type(self)), self._common  # which both models share
+        known = vars(self).copy()
         for name in ("_values", "_renumbered", "_unnumbered"):
             known.pop(name, None)
         known.update(parts)
+        object.__setattr__(copy, "__dict__", known)
         return copy
 
     @cached_property

@@ -144,6 +144,7 @@ class TapeCache:
         self._lock = SharedLock()
         self._compiler = ModeCompiler(system, "bounds", ("bounds",), self._text)
         components, guards = len(system.automata), system.guard_count
+        self._combinations = math.prod(len(automaton.modes) for automaton in system.automata)
         self._modes, self._code = GrowingArray((components,)), (GrowingArray(), GrowingArray())
         self._lists = GrowingLists(), GrowingLists(), GrowingLists(()), GrowingLists(())
         self._rows = GrowingArray((system.n,)), GrowingArray((system.n,), np.bool_), GrowingArray((guards,))
@@ -177,8 +178,8 @@ class TapeCache:
 
         The tables of linear modes of few combinations are made at once.
         """
-        counts = [len(automaton.modes) for automaton in self.system.automata]
-        if len(self._numbers) < math.prod(counts) <= MAX_COMPLETE_SET:
+        if len(self._numbers) < self._combinations <= MAX_COMPLETE_SET:
+            counts = [len(automaton.modes) for automaton in self.system.automata]
             self.rows_of(np.array(list(product(*map(range, counts))), dtype=np.int64))
         return self.tapes
 

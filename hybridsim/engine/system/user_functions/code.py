@@ -257,5 +257,6 @@ def _data(model: Model, resets: list[tuple[tuple[Any, ...], dict[str, Any]]]) ->
         "quantities": tuple(output.name for output in model.outputs),
         "resets": tuple((key, tuple(reset)) for key, reset in resets),
         "effects_read": (),  # there are no surfaces
+        "rates_read": (),
         "tape": None,
     }
