@@ -6,6 +6,7 @@ import sys
 from collections.abc import Callable, Iterable, Mapping
 from functools import wraps
 from inspect import Signature, signature
+from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 from warnings import warn
 
@@ -55,6 +56,15 @@ def refuse_both(function: str, former: str, old: Any, name: str, new: Any) -> No
             f"{function}() has both {former}={old!r} and {name}={new!r}, but {former} is the former name of {name}",
             remedy=f"remove `{former}`",
         )
+
+
+def name_of(function: Callable[..., Any]) -> str:
+    """Return the name of a function for messages and tables; an unnamed one is named by its line."""
+    name = str(getattr(function, "__name__", "function"))
+    if name != "<lambda>":
+        return name
+    code = function.__code__
+    return f"lambda (line {code.co_firstlineno} of {Path(code.co_filename).name})"
 
 
 def refuse_unless_taken(

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 import hybridsim as hs
-from hybridsim.calls import refusing
+from hybridsim.calls import name_of, refusing
 from hybridsim.errors import UsageError
 
 
@@ -40,3 +40,10 @@ def test_an_error_inside_of_it_stays_as_it_is() -> None:
         half("one")
     assert not isinstance(raised.value, UsageError)
     assert half(x=3.0) == 1.5
+
+
+def test_a_function_without_a_name_is_named_by_its_line() -> None:
+    assert name_of(test_arguments_that_are_not_taken) == "test_arguments_that_are_not_taken"
+    unnamed = lambda sol: sol.t_end  # noqa: E731  # the subject of the test
+    line = unnamed.__code__.co_firstlineno
+    assert name_of(unnamed) == f"lambda (line {line} of test_calls.py)"

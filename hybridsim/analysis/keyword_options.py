@@ -8,7 +8,7 @@ from functools import cache
 from typing import Any
 
 from hybridsim.arguments import integrator_name
-from hybridsim.calls import refuse_both
+from hybridsim.calls import name_of, refuse_both
 from hybridsim.errors import UsageError, nearest
 from hybridsim.integrators.registry import integrator_class, option_names
 
@@ -47,7 +47,7 @@ def refuse_what_it_does_not_take(function: Callable[..., Any], options: Mapping[
     except (TypeError, ValueError):  # a builtin has no signature
         return
     if not any(p.kind is p.VAR_KEYWORD for p in parameters):
-        _refuse(options, set(_names(function)), getattr(function, "__name__", "the measure"))
+        _refuse(options, set(_names(function)), name_of(function))
 
 
 def _names(call: Callable[..., Any]) -> list[str]:

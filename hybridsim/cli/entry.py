@@ -40,6 +40,7 @@ from hybridsim.cli.commands import (
     sweep,
 )
 from hybridsim.cli.output import complain, only_data_on_stdout
+from hybridsim.cli.repetition import Appended, Stored
 from hybridsim.cli.session import Session
 from hybridsim.errors import HybridsimError, UsageError, nearest
 from hybridsim.files import cannot_write
@@ -50,6 +51,8 @@ class Parser(argparse.ArgumentParser):
 
     def __init__(self, **settings: Any) -> None:
         super().__init__(allow_abbrev=False, formatter_class=argparse.RawDescriptionHelpFormatter, **settings)
+        for name, action in ((None, Stored), ("store", Stored), ("append", Appended)):
+            self.register("action", name, action)
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
         """Parse a command line; unknown options are reported with similar names."""

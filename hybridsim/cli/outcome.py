@@ -104,12 +104,7 @@ def check_drawing(model: Model, args: argparse.Namespace) -> None:
 
 def limits(args: argparse.Namespace) -> dict[str, Any]:
     """Return the limits of a run from the command line, by name."""
-    found: dict[str, Any] = {}
-    for name, text in args.limit:
-        if name in found:
-            raise UsageError(f"--limit {name} occurs twice", remedy=f"use --limit {name}=... only once")
-        found[name] = values.option_value(text)
-    return found
+    return {name: values.option_value(text) for name, text in args.limit}
 
 
 def as_far_as_it_came(run: Callable[[], Solution]) -> Solution:

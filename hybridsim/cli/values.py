@@ -106,12 +106,7 @@ def blaming_the_command_line() -> Iterator[None]:
 
 
 def _expressions(pairs: Iterable[tuple[str, str]], option: str) -> dict[str, Expression]:
-    found: dict[str, Expression] = {}
-    for name, text in pairs:
-        if name in found:
-            raise UsageError(f"{option} {name} occurs twice", remedy=f"set {name} only once")
-        found[name] = parse(text, Place(file=f"{option} {name}", text=text))
-    return found
+    return {name: parse(text, Place(file=f"{option} {name}", text=text)) for name, text in pairs}
 
 
 def end_time(model: Model, text: str | None, default_periods: int = DEFAULT_PERIODS) -> float:

@@ -11,14 +11,13 @@ from matplotlib.figure import Figure
 from hybridsim.model.checks.units import time_unit
 from hybridsim.plot.shared import style
 from hybridsim.plot.shared.scale import label_axis
-from hybridsim.plot.shared.smooth_parts import Window, unit_of, window_of
+from hybridsim.plot.shared.smooth_parts import Window, samples_of, unit_of, window_of
 
 if TYPE_CHECKING:
     from hybridsim.analysis import Fit
     from hybridsim.solution import Solution
 
 _MOST_RECORDS = 3
-_POINTS = 2000  # of the fitted line
 
 
 def fit(result: Fit) -> Figure:
@@ -62,10 +61,10 @@ def _draw(
     upper, lower = axes
     inside = (samples[0] >= window.t0) & (samples[0] <= window.t1) & np.isfinite(samples[1])
     t, measured, residual = (each[inside] for each in samples)
-    fine = np.linspace(window.t0, window.t1, _POINTS)
-    line = solution.output(name, fine)
+    fitted = samples_of(solution, [name], window)
+    line = fitted.values[name]
     unit = unit_of(solution, name)
-    upper.plot(fine, line, color=style.PALETTE[0], linewidth=1.3, label="fitted")
+    upper.plot(fitted.t, line, color=style.PALETTE[0], linewidth=1.3, label="fitted")
     upper.plot(t, measured, "o", color=style.INK, markersize=2.4, label="measured")
     upper.legend(
         fontsize=9, frameon=False, ncols=2, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.1

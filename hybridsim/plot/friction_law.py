@@ -12,9 +12,11 @@ from hybridsim.errors import UsageError
 from hybridsim.expr import evaluate, parse
 from hybridsim.model import Contact, FrictionLaw, Model, Output, State, load_law
 from hybridsim.plot.shared import style
+from hybridsim.plot.shared.curve_samples import sample_curves
+from hybridsim.plot.shared.smooth_parts import Window, samples_of
 from hybridsim.simulate import simulate
 
-_POINTS = 2000  # per period; a loop of Iwan's model has at most a hundred corners
+_PARTS = 300  # first division of the speeds
 
 
 def friction_law(
@@ -71,9 +73,14 @@ def friction_law(
 
 def _curve(axes: Axes, contact: Contact, speed: float) -> None:
     limits = evaluate(contact.limit_force(), {}), -evaluate(contact.limit_force(backward=True), {})
-    speeds = speed * np.linspace(0.0, 1.0, _POINTS)
+    corners = [v for table in contact.law.tables if table.over.text == "v" for v in table.at if 0 < v < speed]
+    knots = np.union1d(speed * np.linspace(0.0, 1.0, _PARTS), corners)
     for sign, colour in ((1, style.PALETTE[0]), (-1, style.PALETTE[1])):
-        force = [sign * slip_force(contact, v, backward=sign < 0) for v in speeds]
+
+        def signed(at: np.ndarray, _: bool, sign: int = sign) -> np.ndarray:
+            return np.array([[sign * slip_force(contact, v, backward=sign < 0) for v in at.tolist()]])
+
+        speeds, (force,), _ = sample_curves(signed, knots, np.zeros(len(knots) - 1, dtype=bool))
         axes.plot(sign * speeds, force, color=colour, linewidth=1.6)
         for table in contact.law.tables if sign > 0 else ():
             marked = [v for v in table.at if v <= speed and table.over.text == "v"]
@@ -107,8 +114,8 @@ def _driven(
     model = Model("driven", (displacement,), contacts=(driven,), outputs=(Output("f", parse("f")),))
     period = 2 * pi / rate
     solution = simulate(model, (0.0, 2 * period), integrator=integrator, rtol=1e-8)
-    t = np.linspace(period, 2 * period, _POINTS)
-    force = solution.output("f", t)
+    samples = samples_of(solution, ["f", "x"], Window(period, 2 * period))
+    t, force = samples.t, samples.values["f"]
     curves = [mean + speed * np.cos(rate * t), amplitude * np.sin(rate * t)]
     for panel, x in zip(axes, curves, strict=False):
         panel.plot(x, force, color=style.INK, linewidth=1.4)  # one curve: the law has no modes of slip

@@ -10,12 +10,11 @@ from matplotlib.figure import Figure
 from hybridsim.model.checks.units import time_unit
 from hybridsim.plot.shared import style
 from hybridsim.plot.shared.scale import label_axis
-from hybridsim.plot.shared.smooth_parts import unit_of
+from hybridsim.plot.shared.smooth_parts import Window, samples_of, unit_of
 
 if TYPE_CHECKING:
     from hybridsim.analysis import LawFits
 
-_POINTS = 2000  # of each line
 _LINES = ("-", "--", "-.", ":")
 
 
@@ -41,10 +40,11 @@ def law_fits(result: LawFits) -> Figure:
     values, largest = [measured[np.isfinite(measured)]], 0.0
     for k, row in enumerate(result.rows):
         colour, solution = style.PALETTE[k % len(style.PALETTE)], row.fit.solution(0)
-        fine = np.linspace(max(float(record.t[0]), solution.t_start), solution.t_end, _POINTS)
-        line, residual = solution.output(name, fine), row.fit.residuals[0][name]
+        window = Window(max(float(record.t[0]), solution.t_start), solution.t_end)
+        samples, residual = samples_of(solution, [name], window), row.fit.residuals[0][name]
+        line = samples.values[name]
         label = style.literal(row.label)
-        upper.plot(fine, line, color=colour, linewidth=1.3, linestyle=_LINES[k % 4], label=label)
+        upper.plot(samples.t, line, color=colour, linewidth=1.3, linestyle=_LINES[k % 4], label=label)
         lower.plot(record.t, residual, "o", color=colour, markersize=2.0)
         values.append(line)
         largest = max(largest, float(np.nanmax(np.abs(residual))))

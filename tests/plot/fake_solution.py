@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from types import SimpleNamespace
 
 import numpy as np
 
@@ -50,6 +51,10 @@ class FakeSolution:
     stats: dict = field(
         default_factory=lambda: {"steps": 10, "rejected": 0, "rhs_evaluations": 40, "guard_evaluations": 20}
     )
+
+    @property
+    def _trajectory(self) -> SimpleNamespace:
+        return SimpleNamespace(own_times=self.t)
 
     @property
     def components(self) -> tuple:

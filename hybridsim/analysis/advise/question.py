@@ -12,6 +12,7 @@ from hybridsim.analysis.steady.over_run import OverRun
 from hybridsim.analysis.steady.result import SteadyState
 from hybridsim.analysis.steady.steady_state import steady_state
 from hybridsim.analysis.time_budget import Stopwatch
+from hybridsim.calls import name_of
 from hybridsim.engine.system.period import system_period
 from hybridsim.engine.system.system_cache import system_of
 from hybridsim.errors import HybridsimError, UsageError, near, nearest
@@ -251,7 +252,7 @@ def question_of(model: Model, quantity: Any, t_span: tuple[float, float] | None,
         For an unknown quantity, or a quantity of a run without t_span.
     """
     if callable(quantity):
-        return Question(getattr(quantity, "__name__", "a function"), quantity, t_span, accuracy)
+        return Question(name_of(quantity), quantity, t_span, accuracy)
     if not isinstance(quantity, str):
         raise UsageError(
             f"`quantity` cannot be {quantity!r}",

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from hybridsim.analysis.ladder.forces import inlined, with_forces, with_parameters
+from hybridsim.analysis.ladder.forces import inlined, need_plain_tables, with_forces, with_parameters
 from hybridsim.analysis.ladder.ladder_step import DoesNotApply, LadderStep, Scene, need_stick
 from hybridsim.analysis.ladder.linear_response import LinearResponse, NotLinear
 from hybridsim.analysis.steady.steady_state import steady_state
@@ -17,6 +17,7 @@ from hybridsim.engine.system.system_cache import system_of
 from hybridsim.errors import HybridsimError
 from hybridsim.expr import evaluate, parse, substitute
 from hybridsim.model import Contact, Model, Output
+from hybridsim.model.laws.law import SPEED
 
 # Gauss's rule over a quarter cycle. It resolves a Stribeck knee of 1/100 of the largest speed to 1e-10.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(128)
@@ -36,12 +37,19 @@ class FirstHarmonic:
         self._values = model.parameter_values()
         self._speed = _unused(set(self._values), "speed")
         self._slip = inlined(model, contact.slip_force(parse(self._speed)))
-        unknown = self._slip.names - self._values.keys() - {self._speed}
+        need_plain_tables(contact)
+        self._tables = {
+            contact.variable(table.name): table
+            for table in contact.law.tables
+            if table.over.text == SPEED and not any(table.expressions())
+        }
+        unknown = self._slip.names - self._values.keys() - self._tables.keys() - {self._speed}
         if unknown:
             raise DoesNotApply(
                 f"the friction of contact {contact.name} depends on {', '.join(sorted(unknown))}"
             )
-        self._constant = self._slip_at(0.0) if self._speed not in self._slip.names else None
+        depends_on_speed = bool(self._slip.names & {self._speed, *self._tables})
+        self._constant = None if depends_on_speed else self._slip_at(0.0)
 
     def __call__(self, speed: float) -> float:
         if self._constant is not None:
@@ -51,7 +59,8 @@ class FirstHarmonic:
         return float(_WEIGHTS @ (forces * cosines))  # (4/pi) (pi/4) = 1
 
     def _slip_at(self, v: float) -> float:
-        return float(evaluate(self._slip, {**self._values, self._speed: v}))
+        of_tables = {name: table.value(v) for name, table in self._tables.items()}
+        return float(evaluate(self._slip, {**self._values, **of_tables, self._speed: v}))
 
 
 def _unused(taken: set[str], wish: str) -> str:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from typing import Any
 
+from hybridsim.analysis.ladder.ladder_step import DoesNotApply
 from hybridsim.expr import Expression, parse, substitute
 from hybridsim.model import Component, Contact, FrictionLaw, Mode, Model, Parameter
 from hybridsim.model.free_name import free_name, names_of_model
@@ -58,6 +60,31 @@ def with_contacts(model: Model, change: Callable[[Contact], Contact], title: str
 def at_speed(slip: Expression, speed: str) -> Expression:
     """Return the slip force at a speed, which is a number or the name of a parameter."""
     return substitute(slip, {SPEED: parse(speed)})
+
+
+def need_plain_tables(contact: Contact) -> None:
+    """Reject a law with a table that depends on the speed in another way than as its only argument."""
+    for table in contact.law.tables:
+        if any(SPEED in names for names in table.arguments()) and (
+            table.over.text != SPEED or table.across is not None
+        ):
+            arguments = " and ".join(e.text for e in (table.over, table.across) if e is not None)
+            raise DoesNotApply(
+                f"the table {table.name} of contact {contact.name} depends on {arguments}, not on the speed v alone; "
+                "compare it with a constant law by compare_laws"
+            )
+
+
+def law_at_speed(law: FrictionLaw, speed: float) -> FrictionLaw:
+    """Return a set-valued law whose tables of the speed have their values at one speed, as constants."""
+    of_speed = {t.name: t.expression_at(speed, t.name) for t in law.tables if t.over.text == SPEED}
+    tables = tuple(table for table in law.tables if table.name not in of_speed)
+    forces: dict[str, Any] = {
+        name: substitute(force, of_speed)
+        for name in ("slip", "stick", "slip_backward", "stick_backward")
+        if (force := getattr(law, name)) is not None
+    }
+    return replace(law, tables=tables, **forces)
 
 
 def with_law(contact: Contact, law: FrictionLaw) -> Contact:

@@ -5,8 +5,15 @@ from __future__ import annotations
 import random
 from dataclasses import replace
 
-from hybridsim.analysis.ladder.forces import at_speed, inlined, with_contacts, with_law
-from hybridsim.analysis.ladder.ladder_step import DoesNotApply, LadderStep, NothingToDrop, Scene, need_stick
+from hybridsim.analysis.ladder.forces import (
+    at_speed,
+    inlined,
+    law_at_speed,
+    need_plain_tables,
+    with_contacts,
+    with_law,
+)
+from hybridsim.analysis.ladder.ladder_step import LadderStep, NothingToDrop, Scene, need_stick
 from hybridsim.expr import evaluate
 from hybridsim.model import Contact, Model
 
@@ -24,8 +31,8 @@ class OneCoefficient(LadderStep):
         """Return the model in which the stick limit equals the force of slow sliding."""
         model = scene.model
         need_stick(model)
-        if any(contact.law.tables for contact in model.contacts):
-            raise DoesNotApply("the friction law of a contact is a table")
+        for contact in model.contacts:
+            need_plain_tables(contact)
         jumps = [_jumps(model, contact) for contact in model.contacts]
         if not any(jumps):
             raise NothingToDrop(
@@ -36,10 +43,12 @@ class OneCoefficient(LadderStep):
 
 
 def _lowered(contact: Contact) -> Contact:
-    law = contact.law
-    backward = None if law.slip_backward is None else at_speed(law.slip_backward, "0")
+    law, at_rest = contact.law, law_at_speed(contact.law, 0.0)
+    backward = None if at_rest.slip_backward is None else at_speed(at_rest.slip_backward, "0")
     name = f"{law.name}, {OneCoefficient.title}"
-    return with_law(contact, replace(law, name=name, stick=at_speed(law.slip, "0"), stick_backward=backward))
+    return with_law(
+        contact, replace(law, name=name, stick=at_speed(at_rest.slip, "0"), stick_backward=backward)
+    )
 
 
 def _jumps(model: Model, contact: Contact) -> bool:

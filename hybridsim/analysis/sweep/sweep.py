@@ -24,7 +24,7 @@ from hybridsim.analysis.sweep.run_readings import OfRun
 from hybridsim.analysis.sweep.work.job import Job, Measure, new_token
 from hybridsim.analysis.sweep.work.measure import work
 from hybridsim.arguments import callback, cannot_be, flag, is_row
-from hybridsim.calls import refusing
+from hybridsim.calls import name_of, refusing
 from hybridsim.errors import UsageError
 from hybridsim.mechanics.declaration.system import MechanicalSystem
 from hybridsim.model import Model
@@ -212,5 +212,5 @@ def sweep(
 
 def _named(measure: Any) -> str:
     if callable(measure):
-        return str(getattr(measure, "__name__", "measure"))
+        return name_of(measure)
     return measure if isinstance(measure, str) else ", ".join(measure)

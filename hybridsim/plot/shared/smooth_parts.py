@@ -18,11 +18,13 @@ from hybridsim.engine.system.period import forcing_period
 from hybridsim.errors import UsageError, nearest
 from hybridsim.mechanics.declaration.system import Harmonic, MechanicalSystem
 from hybridsim.model.checks.units import units_of
+from hybridsim.plot.shared.curve_samples import sample_curves
 from hybridsim.solution import Solution
 
-# Points of a whole picture, about four per horizontal pixel. Each part has at least 5 points, and at least 9 if the
-# picture then has no more than 60 000 points: a short slip among long ones remains a curve.
-_POINTS, _LEAST, _MOST_POINTS = 6_000, (5, 9), 60_000
+# First division of a whole picture, two parts per horizontal pixel, before parts on which a curve bends are divided.
+# Between events there are at least 2 parts, and at least 4 if the picture then has no more than 60 000 points.
+_PARTS, _LEAST, _MOST_POINTS = 3_000, (2, 4), 60_000
+_MOST_STEPS = 20_000  # of the integrator, among the ends of the parts
 # If there are more periods than a picture can resolve, only the last few are drawn, without the transient.
 _MAX_PERIODS, _LAST_PERIODS = 24, 4
 CUTS = ("transition", "monitor", "scheduled")  # kinds of events at which a curve may jump or bend
@@ -202,26 +204,30 @@ def require_length(window: Window) -> None:
 
 
 def samples_of(solution: Solution, names: Sequence[str], window: Window) -> Samples:
-    """Return the samples of a window, with both sides of each event, so that each smooth part has its own ends."""
+    """Return the samples of a window, with both sides of each event, so that each smooth part has its own ends.
+
+    Straight lines between the samples show the curves: the samples are dense where a curve bends.
+    """
     require_length(window)
     times = np.concatenate([event_times(solution, CUTS), _input_jumps(solution, window)])
     cuts = np.unique([window.t0, *times[(times > window.t0) & (times < window.t1)], window.t1])
     lengths = np.diff(cuts)
-    least = np.clip(_MOST_POINTS // len(lengths), *_LEAST)
-    counts = np.maximum(least, np.ceil(_POINTS * lengths / lengths.sum())).astype(int)
+    least = np.clip(_MOST_POINTS // (2 * len(lengths)), *_LEAST)
+    counts = np.maximum(least, np.ceil(_PARTS * lengths / lengths.sum())).astype(int)
     firsts = np.concatenate([[0], np.cumsum(counts)])
     steps = np.arange(firsts[-1]) - np.repeat(firsts[:-1], counts)
-    t = np.repeat(cuts[:-1], counts) + steps * np.repeat(lengths / (counts - 1), counts)
-    lasts = firsts[1:] - 1
-    t[lasts] = cuts[1:]
-    is_last = np.zeros(len(t), dtype=bool)
-    is_last[lasts] = True
-    starts, ends = ("+", "-") if solution.t_end >= solution.t_start else ("-", "+")
-    values = {name: np.empty(len(t)) for name in names}
-    for chosen, side in ((~is_last, starts), (is_last, ends)):
-        for name, found in _evaluate(solution, names, t[chosen], side).items():
-            values[name][chosen] = found
-    return Samples(t, values, firsts)
+    grid = np.repeat(cuts[:-1], counts) + steps * np.repeat(lengths / counts, counts)
+    own = solution._trajectory.own_times
+    own = own[(own > window.t0) & (own < window.t1)]
+    knots = np.union1d(np.union1d(grid, cuts), own[:: 1 + len(own) // _MOST_STEPS])
+    sides = ("-", "+") if solution.t_end >= solution.t_start else ("+", "-")
+    t, values, firsts = sample_curves(
+        lambda t, is_after: _evaluate(solution, names, t, sides[is_after]),
+        knots,
+        np.isin(knots[1:], cuts),
+        most=_MOST_POINTS,
+    )
+    return Samples(t, dict(zip(names, values, strict=True)), firsts)
 
 
 def smooth_parts_of(solution: Solution, names: Sequence[str], window: Window) -> list[SmoothPart]:
@@ -239,14 +245,14 @@ def smooth_parts_of(solution: Solution, names: Sequence[str], window: Window) ->
 
 def _evaluate(
     solution: Solution, names: Sequence[str], t: NDArray[np.float64], side: str
-) -> dict[str, NDArray[np.float64]]:
-    """Return the values (k,) of quantities at times (k,); all states are evaluated together."""
+) -> NDArray[np.float64]:
+    """Return the values (n, k) of quantities at times (k,); all states are evaluated together."""
     states = [state.name for state in getattr(solution.model, "states", ())]
     x = solution(t, side=side) if any(name in states for name in names) else np.zeros((0, len(t)))
-    return {
-        name: np.asarray(x[states.index(name)] if name in states else solution.output(name, t, side=side))
-        for name in names
-    }
+    rows = [
+        x[states.index(name)] if name in states else solution.output(name, t, side=side) for name in names
+    ]
+    return np.array(rows).reshape(len(names), len(t))
 
 
 def mode_lookup(solution: Solution) -> Callable[[float], dict[str, str]]:
