@@ -11,7 +11,7 @@ from hybridsim import __version__
 from hybridsim.engine.run.report import describe
 from hybridsim.model import Model
 from hybridsim.model.checks.starting_facts import starting_facts
-from hybridsim.model.checks.units import time_unit
+from hybridsim.model.checks.units import time_unit, unit_of_work
 from hybridsim.model.smoothing.explicit_corners import smoothing_of
 from hybridsim.plot.drawing.mechanism import mechanism
 from hybridsim.plot.drawing.theme import LIGHT
@@ -19,16 +19,20 @@ from hybridsim.plot.shared.style import as_svg
 from hybridsim.presentation.automaton import lines_of
 from hybridsim.report.repeat import Settings
 from hybridsim.solution import Solution
+from hybridsim.solution.by_name import ByName
 from hybridsim.solution.event import counted_kind
 
 _LONGEST = 400_000  # characters of the text of a model; a longer one, with tables of data, is left out
+_MOST_STEPS = (
+    20_000  # of a run whose energies are computed; of more it would take longer than the rest of the page
+)
 _DRAWN = 0.7  # size of the drawing, so that its text is legible on small screens
 _COSTS = {
     "steps": "steps",
     "rejected": "rejected steps",
     "rhs_evaluations": "evaluations of the right-hand side",
     "guard_evaluations": "evaluations of guards",
-    "events": "events",
+    "events": "events, with corners",
     "restarts": "restarts of the integrator",
     "wall_time": "time of the run [s]",
     "kernel_time": "part of it in compiled loops [s]",
@@ -69,16 +73,27 @@ def summary(solution: Solution) -> str:
     trajectory, stats = solution._of_model, solution.stats
     unit = time_unit(solution.model)
     kinds = trajectory.kinds() if solution._run.save != "nothing" else {}
-    counted = ", ".join(counted_kind(kind, n) for kind, n in kinds.items() if kind != "corner")
+    counted = ", ".join(counted_kind(kind, n) for kind, n in kinds.items())
     facts = {
         "Time": f"{solution.t_start:.9g} to {solution.t_end:.9g} {unit}".rstrip(),
         "Integrator": solution.integrator,
         "Events": counted or ("none" if kinds or solution._run.save != "nothing" else "not stored"),
         "Cost": f"{stats['steps']} steps, {stats['rhs_evaluations']} evaluations, {stats['wall_time']:.3g} s",
         "Result": solution.message,
-    }
+    } | _energies(solution)
     rows = "\n".join(f"<div><dt>{escape(k)}</dt><dd>{escape(v)}</dd></div>" for k, v in facts.items())
     return f'<section aria-labelledby="h-run"><h2 id="h-run">Run</h2>\n<dl>{rows}</dl></section>'
+
+
+def _energies(solution: Solution) -> dict[str, str]:
+    """Return the energy that each contact dissipates, if the run stored its states and is not very long."""
+    model, steps = solution.model, solution._of_model.own_times.size
+    if not model.contacts or solution._run.save in ("events", "nothing") or not 1 < steps <= _MOST_STEPS:
+        return {}
+    found = solution.dissipated
+    texts = [f"{c.name} {found[c.name]:.6g} {unit_of_work(model, c)}".rstrip() for c in model.contacts]
+    remark = f" ({found.remark})" if isinstance(found, ByName) and found.remark else ""
+    return {"Energy dissipated by friction": ", ".join(texts) + remark}
 
 
 def drawing(solution: Solution) -> str:

@@ -26,6 +26,7 @@ from hybridsim.plot.drawing.clip import Clip
 from hybridsim.plot.drawing.frame import Frame
 from hybridsim.plot.drawing.kinds import items_of
 from hybridsim.plot.drawing.layout import ends_of
+from hybridsim.plot.drawing.outlines import Label
 from hybridsim.plot.drawing.poses import poses_at
 from hybridsim.plot.drawing.theme import DARK, LIGHT, Theme
 from hybridsim.plot.shared.smooth_parts import Window
@@ -70,6 +71,22 @@ def test_shapes_are_where_their_expressions_say(slide: hs.Solution) -> None:
         start, end = ends_of(poses["damper"], poses, canvas.layout)
         assert start == pytest.approx([-3.0, 0.35])
         assert end == pytest.approx([place - 0.5, 0.35])
+
+
+@pytest.mark.parametrize("angle", range(0, 360, 15))
+def test_the_text_of_an_arrow_is_beside_it(angle: int) -> None:
+    direction = math.cos(math.radians(angle)), math.sin(math.radians(angle))
+    vector = [f"({c!r})*(x + 1)" for c in direction]
+    drawing = [
+        hs.Shape("block", "mass", at=["x", 0], size=[1, 1]),
+        hs.Shape("force", "arrow", at=[0, 0], vector=vector, text="N"),
+    ]
+    solution = hs.simulate(hs.Model("arrow", [hs.State("x", 0, "0*x")], drawing=drawing), (0, 1))
+    canvas = Canvas(solution, Window(0.0, 1.0), LIGHT)
+    (poses,) = poses_at(solution, np.array([0.0]))
+    (label,) = (item for item in items_of(Frame(poses, canvas.layout, LIGHT, {})) if isinstance(item, Label))
+    along = min(max(float(np.dot(label.point, direction)), 0.0), 1.0)
+    assert np.hypot(*(label.point - along * np.array(direction))) > 0.2 * canvas.layout.unit
 
 
 def test_a_contact_has_the_colour_of_its_mode(slide: hs.Solution) -> None:

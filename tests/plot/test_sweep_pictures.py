@@ -67,6 +67,12 @@ def test_of_many_readings_those_that_people_ask_for_first_are_drawn() -> None:
     )
 
 
+def test_a_reading_of_a_mode_is_named_once() -> None:
+    result = hs.sweep("dfcs", {"omega": [400.0, 500.0]}, "mode_fraction.f.stick", t_span=(0, 0.1))
+    (panel,) = sweep_lines(result)
+    assert panel.get_ylabel().split() == ["mode", "fraction", "of", "f.stick"]
+
+
 def test_lines_of_two_parameters_say_where_there_is_nothing() -> None:
     (panel,) = swept(omega=OMEGA, N=N).plot("a", over="omega")
     legend = [text.get_text() for text in panel.get_legend().get_texts()]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import re
 from base64 import b64encode
 from pathlib import Path
@@ -123,6 +124,28 @@ def test_the_page_shows_what_the_run_is(page: ParsedPage, rubbing: hs.Solution) 
     ]
     labels = [text for _, text in page.all("b")]
     assert labels[:3] == ["x [µm]", "v [mm/s]", "f [N]"]
+
+
+def test_the_page_shows_the_energy_of_each_contact(tmp_path: Path) -> None:
+    """A block of 2 kg stops from 1.5 m/s: friction takes its kinetic energy."""
+    states = [hs.State("x", 0, "v", unit="m"), hs.State("v", 1.5, "-f/2", unit="m/s")]
+    contact = hs.Contact("f", velocity="v", normal="N", law="coulomb", arguments={"mu": 0.5})
+    parameters = [hs.Parameter("N", 8, unit="N")]
+    sol = hs.simulate(hs.Model("block", states, parameters, contacts=[contact]), (0, 3))
+    page = page_of(sol, tmp_path)
+    terms, facts = ([text for _, text in page.all(tag)] for tag in ("dt", "dd"))
+    assert dict(zip(terms, facts, strict=True))["Energy dissipated by friction"] == "f 2.25 J"
+
+
+def test_events_and_corners_add_up_to_the_events_of_the_cost(tmp_path: Path) -> None:
+    """The rate |x| of x = cos(t) has a corner at each of six passages of zero."""
+    states = [hs.State("x", 1, "v"), hs.State("v", 0, "-x"), hs.State("w", 0, "abs(x)")]
+    sol = hs.simulate(hs.Model("corners", states), (0, 6 * math.pi))
+    page = page_of(sol, tmp_path)
+    terms, facts = ([text for _, text in page.all(tag)] for tag in ("dt", "dd"))
+    assert dict(zip(terms, facts, strict=True))["Events"] == "6 corners"
+    text = "".join(page.elements[0][2])
+    assert re.search(r"events, with corners\s*6\b", text)
 
 
 def test_text_of_a_model_stays_text(tmp_path: Path) -> None:

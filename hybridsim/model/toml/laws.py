@@ -82,7 +82,9 @@ def read_law(
     if law is None:
         from hybridsim.model.library import list_laws
 
-        table.fail(f"unknown law '{name}'", nearest(name, {*laws, *list_laws()}, kind="laws"), "name")
+        remedy = nearest(name, {*laws, *list_laws()}, kind="laws")
+        own = f"declare a law of your own, such as a table, in [laws.{name}]"
+        table.fail(f"unknown law '{name}'", f"{remedy}\n{own}", "name")
         return None
     return law, arguments
 

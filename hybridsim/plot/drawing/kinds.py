@@ -219,7 +219,10 @@ def _arrow(pose: Pose, frame: Frame) -> Items:
     barbs = np.array([[length, 0.0], [length - head, 0.42 * head], [length - head, -0.42 * head]])
     yield Outline(along(pose.at, tip, barbs), colour, 0.8, colour, FRONT)
     if pose.shape.text:
-        yield Label(tip + [0.0, 0.3 * unit], pose.shape.text, colour)
+        # above the tip, or behind the tail if the shaft is there
+        is_downward = pose.vector[1] < -0.5 * length
+        point = pose.at - 0.3 * unit / length * pose.vector if is_downward else tip + [0.0, 0.3 * unit]
+        yield Label(point, pose.shape.text, colour)
 
 
 def _line(pose: Pose, frame: Frame) -> Items:

@@ -121,8 +121,8 @@ def label_parameter(axis: Axis, result: Sweep, name: str) -> None:
 def label_result(axis: Axis, result: Sweep, name: str, values: np.ndarray) -> None:
     """Label an axis with the name and unit of a result."""
     label = label_of(result, name)
-    title = label if " " in label else ""
-    label_axis(axis, label, result.units.get(name, ""), *range_of(values), title=title)
+    symbol, title = ("", label) if " " in label else (label, "")
+    label_axis(axis, symbol, result.units.get(name, ""), *range_of(values), title=title)
 
 
 def draw_map(panel: Axes, result: Sweep, values: np.ndarray, **colours: Any) -> QuadMesh:

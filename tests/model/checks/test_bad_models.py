@@ -86,6 +86,7 @@ FORM = {
     "a component without modes": (RELAY + "[components.empty]\n", "it has no modes", 12),
     "two initial modes": (changed(RELAY, "off]", "off]\ninitial = true"), "two initial modes, 'on' and 'off'", 10),
     "an unknown law": (changed(BLOCK, "coulomb", "culomb"), "unknown law 'culomb'", 13),
+    "a table without a law": (changed(BLOCK, "coulomb", "table"), "such as a table, in [laws.table]", 13),
     "a parameter list of numbers": (changed(OWN, '{ a = 0.5, b = "a/2" }', "[1]"), "'parameters' contains 1", 15),
     "law keys in a contact": (changed(BLOCK, 'mu = "mu" }', 'mu = "mu", title = "x" }'), "[laws.coulomb]", 13),
     "an unknown schema": ("schema = 2\n" + BLOCK, "write schema = 1", 1),
