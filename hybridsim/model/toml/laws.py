@@ -83,8 +83,8 @@ def read_law(
         from hybridsim.model.library import list_laws
 
         remedy = nearest(name, {*laws, *list_laws()}, kind="laws")
-        own = f"declare a law of your own, such as a table, in [laws.{name}]"
-        table.fail(f"unknown law '{name}'", f"{remedy}\n{own}", "name")
+        remedy += f"\ndeclare a law of your own, such as a table, in [laws.{name}]"
+        table.fail(f"unknown law '{name}'", remedy, "name")
         return None
     return law, arguments
 
