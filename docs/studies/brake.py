@@ -164,7 +164,8 @@ The model `models/mode-coupling.toml` is the model of Hoffmann, Fischer, Allgaie
 [doi:10.1016/S0093-6413(02)00254-9](<https://doi.org/10.1016/S0093-6413(02)00254-9>)). A block pressed on a belt moves
 along and across the belt. Friction couples the two motions, because the normal load depends on the motion across the
 belt. The coefficient of friction is constant, so the squeal is not caused by friction that decreases with the
-speed. The script `python docs/studies/brake.py` finds the onset in three ways:
+speed. The page [Find the onset of squeal](../how-to/squeal.md) treats that cause. The script `python
+docs/studies/brake.py` finds the onset in three ways:
 
 - **Closed form.** While the block slides, the eigenvalues lambda of the motion satisfy lambda^2 + c lambda + 2 =
   +-sqrt(1 - 4 mu/3). Up to mu = 3/4 both motions decay with the rate c/2. At mu = 3/4 their frequencies are equal. For

@@ -12,13 +12,13 @@ class Stored(argparse.Action):
     """An option with one value, or with a list of values to which a repeated option appends."""
 
     def __call__(self, parser: Any, namespace: argparse.Namespace, values: Any, option: Any = None) -> None:
-        given = vars(namespace).setdefault("given", set())
-        if option and self.dest in given:
+        seen = vars(namespace).setdefault("seen", set())
+        if option and self.dest in seen:
             before = getattr(namespace, self.dest)
             if not (isinstance(values, list | tuple) and isinstance(before, list | tuple)):
                 raise UsageError(f"{option} occurs twice", remedy=f"use {option} only once")
             values = [*before, *values]
-        given.add(self.dest)
+        seen.add(self.dest)
         setattr(namespace, self.dest, values)
 
 

@@ -43,12 +43,12 @@ def sample_curves(
     at_b[:, is_break] = at_ends
     sizes = sizes_of(np.concatenate([at_a, at_middle, at_b], axis=1)) if sizes is None else sizes
     times, values = [b[is_break], a, middle], [at_ends, at_a, at_middle]
-    room = most - sum(map(len, times))
+    left = most - sum(map(len, times))
     for _ in range(deepest - 1):
         deviation = _deviation(at_a, at_middle, at_b, sizes)
         coarse = np.flatnonzero((deviation > _DEVIATION) & (middle > a) & (middle < b))
-        if 2 * len(coarse) > room:
-            coarse = coarse[np.argsort(-deviation[coarse], kind="stable")[: max(int(room / 2), 0)]]
+        if 2 * len(coarse) > left:
+            coarse = coarse[np.argsort(-deviation[coarse], kind="stable")[: max(int(left / 2), 0)]]
         if not len(coarse):
             break
         a, middle, b = a[coarse], middle[coarse], b[coarse]
@@ -59,7 +59,7 @@ def sample_curves(
         at_middle = evaluate(middle, True)
         times.append(middle)
         values.append(at_middle)
-        room -= len(middle)
+        left -= len(middle)
     every = np.concatenate(times)
     is_after = np.arange(len(every)) >= len(at_ends[0])  # values before a jump are first
     order = np.lexsort((is_after, every))
