@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from hybridsim.arguments import cannot_be, number
@@ -80,27 +80,27 @@ def refuse_plain_time(system: System, period: float | None) -> None:
     inputs = [signal.name for signal in model.inputs]
     names = [*system.names, *sorted(discrete), *inputs, *model.variables()]
     numbers = {name: 0.739 + 0.0618 * k for k, name in enumerate(names)} | model.parameter_values()
-    for declaration, tree in _with_time(model):
+    for declaration, tree in _with_time(model, meanings):
         if period is None:
             raise UsageError(
-                f"{declaration} contains t outside of sines and cosines, so the period of model {model.name} is "
-                "unknown",
+                f"{_cause(declaration, tree, meanings)} contains t outside of sines and cosines, so the period of "
+                f"model {model.name} is unknown",
                 remedy="if the motion is periodic, pass `period`",
             )
         if meanings.depended_on(names_of(tree)) & discrete:
             continue  # a discrete state may hold the time of an event
-        times = [period * (k + _OFFSET) / _SAMPLES for k in range(_SAMPLES)]
-        pairs = [
-            [number_of(tree, {**numbers, TIME: at}, meanings.lookup) for at in (t, t + period)] for t in times
-        ]
-        largest = max((abs(value) for pair in pairs for value in pair if value is not None), default=0.0)
-        for t, (now, later) in zip(times, pairs, strict=True):
-            if now is not None and later is not None and abs(later - now) > _REPEATS * largest:
-                raise UsageError(
-                    f"{declaration} does not repeat after the period {period:g}: it changes by {later - now:.4g} from "
-                    f"t = {t:.4g} to t = {t + period:.4g}",
-                    remedy="pass the period of the forcing, or replace a ramp by its final value",
-                )
+        found = _change(tree, period, numbers, meanings)
+        if found is None:
+            continue
+        for name in sorted(meanings.reached([tree])):  # a definition that does not repeat is the cause
+            inner = _change(meanings.definitions[name], period, numbers, meanings)
+            declaration, found = (declaration, found) if inner is None else (f"definition {name}", inner)
+        t, change = found
+        raise UsageError(
+            f"{declaration} does not repeat after the period {period:g}: it changes by {change:.4g} from "
+            f"t = {t:.4g} to t = {t + period:.4g}",
+            remedy="pass the period of the forcing, or replace a ramp by its final value",
+        )
     if period is None:  # t in a guard or a reset
         raise UsageError(
             f"model {model.name} contains t outside of sines and cosines, so the period of its forcing is unknown",
@@ -108,9 +108,34 @@ def refuse_plain_time(system: System, period: float | None) -> None:
         )
 
 
-def _with_time(model: Model) -> Iterator[tuple[str, ast.expr]]:
-    """Yield the declarations that contain t outside of sines and cosines of linear time, with names for messages."""
-    found = [(f"definition {name}", expr) for name, expr in model.definitions]
+def _change(
+    tree: ast.expr, period: float, numbers: Mapping[str, float], meanings: Meanings
+) -> tuple[float, float] | None:
+    """Return a time, and the change of an expression over the period from then on, or None if it repeats."""
+    times = [period * (k + _OFFSET) / _SAMPLES for k in range(_SAMPLES)]
+    pairs = [
+        [number_of(tree, {**numbers, TIME: at}, meanings.lookup) for at in (t, t + period)] for t in times
+    ]
+    largest = max((abs(value) for pair in pairs for value in pair if value is not None), default=0.0)
+    for t, (now, later) in zip(times, pairs, strict=True):
+        if now is not None and later is not None and abs(later - now) > _REPEATS * largest:
+            return t, later - now
+    return None
+
+
+def _cause(declaration: str, tree: ast.expr, meanings: Meanings) -> str:
+    """Return the definition that brings t into a declaration, or the declaration itself."""
+    inner = [name for name in sorted(meanings.reached([tree])) if _has_plain_time(meanings.definitions[name])]
+    return f"definition {inner[0]}" if inner else declaration
+
+
+def _with_time(model: Model, meanings: Meanings) -> Iterator[tuple[str, ast.expr]]:
+    """Yield the declarations that depend on t outside of sines and cosines of linear time, with names for messages.
+
+    A definition is listed only if an event reads it. Elsewhere its value is inserted.
+    """
+    in_events = meanings.reached(_event_trees(model))
+    found = [(f"definition {name}", expr) for name, expr in model.definitions if name in in_events]
     for contact in model.contacts:
         found.append((f"contact {contact.name}, normal", contact.normal))
         found.append((f"contact {contact.name}, velocity", contact.velocity))
@@ -120,7 +145,21 @@ def _with_time(model: Model) -> Iterator[tuple[str, ast.expr]]:
             what = f"component {component.name}, mode {mode.name}"
             found += [(f"{what}, {name}", expr) for name, expr in (*mode.der.items(), *mode.set.items())]
     found += [(f"state {state.name}, der", state.der) for state in model.states]
-    yield from ((what, expr.tree) for what, expr in found if _has_plain_time(expr.tree))
+    for what, expr in found:
+        if _has_plain_time(meanings.written_out(expr.tree)):
+            yield what, expr.tree
+
+
+def _event_trees(model: Model) -> Iterator[ast.expr]:
+    """Yield the expressions that decide events or are set by them."""
+    resets = [*(monitor.reset for monitor in model.monitors), *(one.reset for one in model.schedules)]
+    yield from (monitor.expr.tree for monitor in model.monitors)
+    for component in model.components:
+        for guard in (guard for mode in component.modes for guard in mode.guards):
+            yield guard.expr.tree
+            yield from (choice.when.tree for choice in guard.then if choice.when is not None)
+            resets += [choice.reset for choice in guard.then]
+    yield from (expr.tree for reset in resets for expr in reset.values())
 
 
 def _has_plain_time(node: ast.AST) -> bool:

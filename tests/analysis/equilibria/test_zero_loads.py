@@ -70,6 +70,28 @@ def test_a_load_that_is_zero_only_by_rounding_is_named(normal: str) -> None:
     assert hs.linearize(model, "slip-", t=0.3 + 1e-9).warnings == ()
 
 
+@pytest.mark.parametrize(
+    ("normal", "load", "final"),
+    [
+        ("N0*table", 2.0, 4.0),
+        ("N0*ramp", 2.0, 4.0),
+        ("N0*(1.5 - table)", 4.0, 2.0),
+        ("N0*(1 - exp(-t))", 2.528, 4.0),
+    ],
+)
+def test_a_load_that_settles_at_another_value_is_named(normal: str, load: float, final: float) -> None:
+    model = replace(pad(normal), inputs=pad(normal).inputs[:1])
+    (warning,) = hs.linearize(model, "slip-", t=1.0).warnings
+    assert f"is {load:.4g} at t = 1 and settles at {final:.4g}." in warning
+    later = 100.0 if "exp" in normal else 2.0
+    assert hs.linearize(model, "slip-", t=later).warnings == ()
+
+
+@pytest.mark.parametrize("normal", ["N0*(1 + t)", "N0*(1.5 + wave)", "N0*(1.5 + sin(t))"])
+def test_a_load_that_never_settles_is_not_named(normal: str) -> None:
+    assert hs.linearize(pad(normal), "slip-", t=1.0).warnings == ()
+
+
 def test_a_load_on_a_sine_wave_that_is_large_is_not_named() -> None:
     """At a quarter of its period the wave is at its largest value, 1."""
     assert hs.linearize(pad("N0*abs(wave)"), "slip-", t=1.0).warnings == ()

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.special import j1
 
 import hybridsim as hs
 from hybridsim.errors import HybridsimError, UsageError
@@ -113,6 +114,16 @@ def test_a_ramp_does_not_repeat_with_a_period_that_is_passed(ramp: str) -> None:
     defined = model('x = { start = 0, der = "push - x" }', "", f"[definitions]\npush = '{ramp}'")
     with pytest.raises(UsageError, match="definition push does not repeat"):
         hs.steady_state(defined, period=2.0 * math.pi)
+
+
+def test_a_phase_that_only_sines_read_repeats() -> None:
+    """The mean of cos(u + z sin(u)) over a period of u is -J1(z)."""
+    force = "cos(phase + 0.1*sin(phase))"
+    driven = model(f'x = {{ start = 0, der = "-x + {force}" }}', "", '[definitions]\nphase = "2*t"')
+    found = hs.steady_state(driven, period=math.pi)
+    assert found.mean["x"] == pytest.approx(-j1(0.1), rel=1e-6)
+    with pytest.raises(UsageError, match="definition phase does not repeat after the period 1:"):
+        hs.steady_state(driven, period=1.0)
 
 
 @pytest.mark.parametrize("force", ["sin(t**2)", "cos(0.3*t*t)", "sin(exp(t))"])
