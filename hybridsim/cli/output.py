@@ -94,7 +94,7 @@ def require_writable(path: Path, option: str, suffixes: Sequence[str] = ()) -> N
     folder = path.parent
     if not folder.is_dir():
         raise UsageError(
-            f"{option}: the folder {folder} does not exist", remedy="create it first, or use another folder"
+            f"{option}: the folder {folder} does not exist", remedy="create this folder, or use another one"
         )
     if not (os.access(path, os.W_OK) if path.exists() else _takes_files(folder)):
         raise UsageError(

@@ -112,7 +112,7 @@ class Question:
             return steady
         solution = simulate(model, self.t_span, rtol=0.01 * self.accuracy, progress=progress)
         if not solution.success:
-            raise NoAnswer(f"{solution.status}: {solution.message}")
+            raise NoAnswer(f"the run ended as {solution.status}: {solution.message}")
         return OverRun(solution)
 
     def read(self, motion: Any) -> Number:

@@ -100,7 +100,7 @@ class _Settling:
             solution = simulate(model, self.span, integrator=name, keep=self.save, progress=watch, **options)
             seconds = stopwatch.seconds
             if not solution.success:
-                raise NoAnswer(f"{solution.status}: {solution.message}")
+                raise NoAnswer(f"the run ended as {solution.status}: {solution.message}")
             run = OverRun(solution)
             if self.question.t_span is None:
                 run.period = solution.t_end - solution.t_start

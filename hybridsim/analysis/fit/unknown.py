@@ -74,7 +74,7 @@ class Unknown:
         return math.log(value) if self.log else value
 
     def value(self, coordinate: float) -> float:
-        """Return the value of a coordinate."""
+        """Return the value of the unknown from its coordinate, within the bounds."""
         found = math.exp(coordinate) if self.log else float(coordinate)
         return min(max(found, self.low), self.high)
 

@@ -159,7 +159,7 @@ class Scope(Findings):
             ) from None
 
     def need_own(self, expr: Expression, what: str, known: Iterable[str]) -> None:
-        """Report names of the model and conditions in an expression of a friction law."""
+        """Report an error for names of the model, and for conditions, in an expression of a friction law."""
         foreign = sorted(expr.names - frozenset(known))
         if foreign or expr.is_boolean:
             reason = f"unknown name '{foreign[0]}'" if foreign else f"'{expr.text}' is a condition"

@@ -65,7 +65,7 @@ def label_axis(
 
 
 def _in_lines(heading: str) -> list[str]:
-    """Return the lines of a title along a vertical axis; a last line of one or two letters gets one more word."""
+    """Return the lines of a title along a vertical axis; the last line has more than two letters if possible."""
     lines = textwrap.wrap(heading, _ALONG_Y)
     if len(lines) > 1 and len(lines[-1]) <= 2 and " " in lines[-2]:
         before, _, word = lines[-2].rpartition(" ")

@@ -46,7 +46,7 @@ class Rule(NamedTuple):
 
 
 class FlowScratch(NamedTuple):
-    """Scratch arrays."""
+    """Scratch arrays of the collocation equations of one part of a segment."""
 
     panel: Any  # `hybridsim.engine.series.tangent_panel.Panel`
     seeds: np.ndarray  # (n + 1 + P, n + q)
