@@ -133,3 +133,10 @@ def test_both_sides_of_a_jump_are_samples() -> None:
     )
     assert t[firsts[1] - 1 : firsts[1] + 1].tolist() == [1.0, 1.0]
     assert y[firsts[1] - 1 : firsts[1] + 1].tolist() == [1.0, 7.0]
+
+
+def test_a_strip_of_modes_without_curves_has_samples() -> None:
+    t, values, firsts = sample_curves(
+        lambda at, _: np.zeros((0, len(at))), np.array([0.0, 1.0]), np.zeros(1, dtype=bool)
+    )
+    assert values.shape == (0, len(t)) and firsts.tolist() == [0, len(t)]

@@ -61,7 +61,7 @@ def sample_curves(
         values.append(at_middle)
         left -= len(middle)
     every = np.concatenate(times)
-    is_after = np.arange(len(every)) >= len(at_ends[0])  # values before a jump are first
+    is_after = np.arange(len(every)) >= at_ends.shape[1]  # values before a jump are first
     order = np.lexsort((is_after, every))
     firsts = np.concatenate([[0], np.flatnonzero(~is_after[order]) + 1])
     return every[order], np.concatenate(values, axis=1)[:, order], firsts
