@@ -87,11 +87,10 @@ def refuse_plain_time(system: System, period: float | None) -> None:
                 f"model {model.name} is unknown",
                 remedy="if the motion is periodic, pass `period`",
             )
-        if meanings.depended_on(names_of(tree)) & discrete:
-            continue  # a discrete state may hold the time of an event
         found = _change(tree, period, numbers, meanings)
         if found is None:
             continue
+        _refuse_stored_time(declaration, tree, meanings, discrete)
         for name in sorted(meanings.reached([tree])):  # a definition that does not repeat is the cause
             inner = _change(meanings.definitions[name], period, numbers, meanings)
             declaration, found = (declaration, found) if inner is None else (f"definition {name}", inner)
@@ -105,6 +104,23 @@ def refuse_plain_time(system: System, period: float | None) -> None:
         raise UsageError(
             f"model {model.name} contains t outside of sines and cosines, so the period of its forcing is unknown",
             remedy="if the motion is periodic, pass `period`",
+        )
+    for declaration, tree in _event_trees(model):
+        if (
+            _has_plain_time(meanings.written_out(tree))
+            and _change(tree, period, numbers, meanings) is not None
+        ):
+            _refuse_stored_time(declaration, tree, meanings, discrete)
+
+
+def _refuse_stored_time(declaration: str, tree: ast.expr, meanings: Meanings, discrete: set[str]) -> None:
+    """Reject a comparison of t with a discrete state, which may store the time of an event."""
+    stored = sorted(meanings.depended_on(names_of(tree)) & discrete)
+    if stored:
+        raise UsageError(
+            f"{declaration} depends on t and on the discrete state {stored[0]}, which may store a time, but the search "
+            "for a steady state sets t back after each period",
+            remedy="use a clock with a period, or a state with the rate 1 that a reset sets to 0",
         )
 
 
@@ -134,7 +150,7 @@ def _with_time(model: Model, meanings: Meanings) -> Iterator[tuple[str, ast.expr
 
     A definition is listed only if an event reads it. Elsewhere its value is inserted.
     """
-    in_events = meanings.reached(_event_trees(model))
+    in_events = meanings.reached(tree for _, tree in _event_trees(model))
     found = [(f"definition {name}", expr) for name, expr in model.definitions if name in in_events]
     for contact in model.contacts:
         found.append((f"contact {contact.name}, normal", contact.normal))
@@ -150,16 +166,20 @@ def _with_time(model: Model, meanings: Meanings) -> Iterator[tuple[str, ast.expr
             yield what, expr.tree
 
 
-def _event_trees(model: Model) -> Iterator[ast.expr]:
-    """Yield the expressions that decide events or are set by them."""
-    resets = [*(monitor.reset for monitor in model.monitors), *(one.reset for one in model.schedules)]
-    yield from (monitor.expr.tree for monitor in model.monitors)
+def _event_trees(model: Model) -> Iterator[tuple[str, ast.expr]]:
+    """Yield the expressions that decide events or are set by them, with names for messages."""
+    resets = [(f"monitor {one.name}", one.reset) for one in model.monitors]
+    resets += [(f"schedule {one.name}", one.reset) for one in model.schedules]
+    yield from ((f"monitor {one.name}", one.expr.tree) for one in model.monitors)
     for component in model.components:
         for guard in (guard for mode in component.modes for guard in mode.guards):
-            yield guard.expr.tree
-            yield from (choice.when.tree for choice in guard.then if choice.when is not None)
-            resets += [choice.reset for choice in guard.then]
-    yield from (expr.tree for reset in resets for expr in reset.values())
+            what = f"guard {guard.name} of {component.name}"
+            yield what, guard.expr.tree
+            yield from ((what, choice.when.tree) for choice in guard.then if choice.when is not None)
+            resets += [(what, choice.reset) for choice in guard.then]
+    yield from (
+        (f"{what}, reset of {name}", one.tree) for what, reset in resets for name, one in reset.items()
+    )
 
 
 def _has_plain_time(node: ast.AST) -> bool:

@@ -125,6 +125,18 @@ def test_a_phase_that_only_a_sine_reads_repeats() -> None:
         hs.steady_state(driven, period=1.0)
 
 
+def test_a_discrete_state_that_stores_a_time_is_refused() -> None:
+    """The kicks at 1 + k pi have the mean 0.01/pi, but t is set back, and no kick follows the stored time."""
+    kicks = """[discrete]
+next = 1.0
+[components.g.modes.a]
+initial = true
+guards.e = { expr = "next - t", then = { to = "a", reset = { x = "x + 0.01", next = "next + pi" } } }"""
+    kicked = model('x = { start = 0, der = "-x + sin(2*t)" }', "", kicks)
+    with pytest.raises(UsageError, match="guard e of g depends on t and on the discrete state next"):
+        hs.steady_state(kicked, period=math.pi)
+
+
 @pytest.mark.parametrize("force", ["sin(t**2)", "cos(0.3*t*t)", "sin(exp(t))"])
 def test_a_sine_of_a_time_that_is_not_linear_does_not_repeat(force: str) -> None:
     chirp = hs.Model("chirp", states=[hs.State("x", 0, f"{force} - x", nominal=1)])
