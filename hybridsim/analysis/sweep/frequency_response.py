@@ -73,7 +73,7 @@ def frequency_response(
     if not swept.states:
         raise UsageError(f"model {swept.name} has no states", remedy="use a model with at least one state")
     readings = [f"amplitude.{swept.states[0].name if quantity is None else text(quantity, 'quantity')}"]
-    for contact in swept.contacts:
+    for contact in (c for c in swept.contacts if c.law.is_set_valued):  # other laws have no stick
         readings += [f"stick_fraction.{contact.name}", f"stops_per_period.{contact.name}"]
     # with warm starts the chain runs along the frequency, which is the first axis
     if options.get("warm_start"):

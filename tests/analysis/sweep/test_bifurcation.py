@@ -149,6 +149,30 @@ def test_frequency_response() -> None:
         hs.frequency_response("dfcs", frequencies, {"omega": loads})
 
 
+@pytest.mark.parametrize(
+    ("law", "arguments", "stiffness", "damping"),
+    [
+        ("tanh", {"mu": 1e5, "v0": 1e6}, 0.0, 0.1),
+        ("dahl", {"mu": 1e9, "sigma": 2.0}, 2.0, 0.0),
+        ("jenkins", {"mu": 1e3, "k": 2.0}, 2.0, 0.0),
+    ],
+)
+def test_a_law_without_stick_has_a_frequency_response(
+    law: str, arguments: dict[str, float], stiffness: float, damping: float
+) -> None:
+    """The law is a damper mu/v0 for low speeds, or a spring for a high limit: x = F/|k - w^2 + i c w|."""
+    model = hs.Model(
+        "linear-limit",
+        [hs.State("x", 0, "v"), hs.State("v", 0, "cos(omega*t) - x - 0.3*v - f")],
+        parameters={"omega": 1.3},
+        contacts=[hs.Contact("f", "v", 1, law, arguments=arguments)],
+    )
+    found = hs.frequency_response(model, [0.7, 1.3])
+    assert list(found.values) == ["amplitude.x"] and (found.status == "ok").all()
+    exact = [1.0 / abs(1.0 + stiffness - w * w + 1j * (0.3 + damping) * w) for w in (0.7, 1.3)]
+    assert found["amplitude.x"] == pytest.approx(exact, rel=1e-7)
+
+
 def test_a_frequency_with_another_name_is_an_argument() -> None:
     model = hs.Model("forced", [hs.State("x", 0, "cos(w*t) - x")], parameters={"w": 1})
     with pytest.raises(
