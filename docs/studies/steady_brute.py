@@ -12,13 +12,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.integrate import solve_ivp
-from scipy.optimize import brentq, minimize_scalar
+from scipy.optimize import brentq
 from steady_points import Friction, Point
 
 import hybridsim as hs
 
-PERIODS = 64, 512, 4096  # that a run has, one after the other, until it repeats
-LIMITS = {"steps": 800_000, "events": 150_000}  # of a run
+PERIODS = 64, 512, 2048  # that a run has, one after the other, until it repeats
+LIMITS = {"steps": 400_000, "events": 100_000}  # of a run
 RTOL = 1e-11
 PHASE = 0.3819  # of the period, at which the states are compared
 LONGEST = 24  # periods after which a motion may repeat
@@ -39,7 +39,8 @@ FOLLOWED = 200  # periods over which it is followed
 class Motion:
     """A motion as plain runs show it.
 
-    kind: "periodic", "rest", "slow" (still on its way), "irregular", or the status of a run that ended early.
+    kind: "periodic", "rest", "slow" (on its way to a repeating motion, or to rest if `multiple` is 0), "irregular",
+    or the status of a run that ended early.
     error: the estimated distance of the states from their limit, in units of their ranges.
     matrix: derivative of the map over the period, or None if the two sides differ.
     """
@@ -69,7 +70,7 @@ def followed(point: Point) -> Motion:
             break
     if motion.kind == "irregular":
         motion.growth = growth(point, sol)
-    elif motion.kind in ("periodic", "slow"):
+    elif motion.multiple:
         begin = last_strobes(point, sol)[0][-1 - motion.multiple]
         motion.matrix, motion.one_sided = derivative(point, sol, begin, motion.period)
     return motion
@@ -124,7 +125,12 @@ def passages(point: Point, sol: hs.Solution) -> np.ndarray:
     if not moving.any():
         return np.zeros(0)
     up = np.flatnonzero((x[j, :-1] < levels[j]) & (x[j, 1:] >= levels[j]))
-    return np.array([brentq(lambda t: sol(t)[j] - levels[j], times[k], times[k + 1], xtol=1e-14) for k in up])
+    before, after = times[up], times[up + 1]
+    for _ in range(60):
+        middle = 0.5 * (before + after)
+        is_above = sol(middle)[j] >= levels[j]
+        before, after = np.where(is_above, before, middle), np.where(is_above, middle, after)
+    return after
 
 
 def judged(point: Point, sol: hs.Solution) -> Motion:
@@ -136,17 +142,20 @@ def judged(point: Point, sol: hs.Solution) -> Motion:
     size = 0.5 * np.ptp(x, axis=0)
     if (size <= RESTS * whole).all():
         return Motion("rest", error=float((size / np.where(whole > 0.0, whole, 1.0)).max()))
+    earlier = sol.t_start + 0.5 * (late[0] - sol.t_start)
+    before = np.ptp(values(sol, np.linspace(earlier, earlier + sol.t_end - late[0], len(late))), axis=0)
+    is_dying = bool((2.0 * size <= 0.7 * before).all())
     scale = np.maximum(size, 1e-6 * whole)
     scale[scale == 0.0] = 1.0
     times, strobes = last_strobes(point, sol)
     if len(times) < 8:
-        return Motion("irregular")
-    best = Motion("irregular")
+        return Motion("slow" if is_dying else "irregular")
+    best = Motion("slow" if is_dying else "irregular")
     for multiple in range(1, min(LONGEST, (len(times) - 1) // 4) + 1):
         changes = np.abs((strobes[multiple:] - strobes[:-multiple]) / scale).max(axis=1)
         last = float(changes[-2 * multiple :].max())
         error = remaining(changes, multiple, last)
-        if error <= REPEATS or (error < 1e-2 and not best.multiple):
+        if error <= REPEATS or (error < 1e-2 and not best.multiple and not is_dying):
             best = Motion("periodic" if error <= REPEATS else "slow", multiple=multiple, error=error)
         if error <= REPEATS:
             break
@@ -166,7 +175,7 @@ def judged(point: Point, sol: hs.Solution) -> Motion:
 
 
 def remaining(changes: np.ndarray, multiple: int, last: float) -> float:
-    """The estimated distance from the limit, if changes over `multiple` periods shrink geometrically."""
+    """The estimated distance from the limit, if changes over `multiple` periods shrink geometrically or like 1/k^2."""
     back = (len(changes) - 2 * multiple) // 2
     before = float(changes[-2 * multiple - back : len(changes) - back].max()) if back > 0 else 0.0
     if last <= 1e-10:
@@ -174,7 +183,9 @@ def remaining(changes: np.ndarray, multiple: int, last: float) -> float:
     if not last < before:
         return last if last <= 1e-2 * REPEATS else math.inf
     rate = (last / before) ** (multiple / back)
-    return last / (1.0 - rate) if rate < 1.0 else math.inf
+    if rate == 1.0:
+        return math.inf
+    return last * max(1.0 / (1.0 - rate), len(changes) / multiple if 8.0 * last > before else 0.0)
 
 
 # -- measures ----------------------------------------------------------------------------------------------------
@@ -196,14 +207,16 @@ def least(
     """The least value of a quantity times a sign."""
     x = np.minimum(sign * sides[0][j], sign * sides[1][j])
     found = float(x.min())
-    near = np.flatnonzero(x <= found + 1e-4 * np.ptp(x)) if is_state else []
-    for i in near:
-        if 0 < i < len(x) - 1 and x[i] <= min(x[i - 1], x[i + 1]):
-            inside = minimize_scalar(
-                lambda t: sign * sol(t)[j], bounds=(times[i - 1], times[i + 1]), method="bounded",
-                options={"xatol": 1e-9 * (times[i + 1] - times[i - 1])},
-            )  # fmt: skip
-            found = min(found, float(inside.fun))
+    near = np.flatnonzero(x <= found + 1e-4 * np.ptp(x)) if is_state else np.zeros(0, dtype=int)
+    near = near[(near > 0) & (near < len(x) - 1)]
+    near = near[x[near] <= np.minimum(x[near - 1], x[near + 1])]
+    low, high = times[near - 1], times[near + 1]
+    for _ in range(4 if len(near) else 0):
+        grid = np.linspace(low, high, 33)
+        inside = sign * sol(grid.ravel())[j].reshape(grid.shape)
+        found = min(found, float(inside.min()))
+        k = np.clip(inside.argmin(axis=0), 1, 31)
+        low, high = (np.take_along_axis(grid, (k + step)[None], axis=0)[0] for step in (-1, 1))
     return found
 
 

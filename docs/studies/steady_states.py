@@ -96,6 +96,8 @@ def judge(drawn: Point, plain: brute.Motion, found: dict[str, Any]) -> tuple[str
         if (kind == "chaotic" and plain.growth < 10.0) or (kind == "quasi-periodic" and is_chaotic):
             return "differs", [f"{kind}, growth {plain.growth:.1e}"]
         return "irregular", []
+    if plain.kind == "slow" and not plain.multiple and kind in ("equilibrium", "not settled"):
+        return "slow", []
     if kind in IRREGULAR:
         return ("slow" if plain.kind == "slow" else "differs"), [f"{kind} and {plain.kind}"]
     expected = "equilibrium" if plain.kind == "rest" else "periodic"

@@ -8,6 +8,7 @@ P. C. Mueller, Chaos, Solitons and Fractals 5 (1995) 1671, doi:10.1016/0960-0779
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,9 +21,12 @@ from hybridsim.errors import SimulationError
 _RESOLVED = 1e-11  # of the largest factor of a part: a smaller one cannot be told from rounding errors
 _LARGEST = 1e100  # factor of a part
 _HALVINGS = 12  # of a part whose factors are not resolved
-_PARTS = 60  # of the motion whose largest exponent is found
-_PERIODS = 5  # in each of them
-FOLLOWED = _PARTS * _PERIODS  # periods over which the largest exponent is measured
+_PARTS, _PERIODS = 60, 5  # parts of a motion whose growth is measured, and periods in each
+_LONGER = 4  # as many parts are followed at most
+_ALIGNED = 10  # parts after which the direction of a change is the one that grows most
+# A trend decides early if it is so many times as large as the variation about it, or a variation that is at most
+# _SMALL if the trend is at most half of it. In the end the factors are 2 and 1. No variation is below _LEAST.
+_CLEAR, _SMALL, _LEAST = 4.0, 0.5, 1e-2
 
 
 class Growth:
@@ -97,13 +101,49 @@ def _orthogonal(change: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]
     return directions, factors, factors > _RESOLVED * factors.max(initial=0.0)
 
 
-def largest_exponents(motion: Motion, start: Point, period: float) -> tuple[float, float]:
-    """Return the mean growth rate of a small change over 150 periods, and over the next 150 periods.
+class LongGrowth(NamedTuple):
+    """The growth of a small change along a motion.
 
-    Exponential growth has the same rate in both halves, unlike growth by a power of time. The rates are -inf if
-    stick reduces the change to zero.
+    exponent: its rate per unit of time; logarithm: the growth over the periods that were followed. is_exponential: the
+    change grows at a steady rate; is_bounded: its size only varies.
+    """
+
+    exponent: float
+    logarithm: float
+    periods: int
+    is_exponential: bool
+    is_bounded: bool
+
+
+def long_growth(motion: Motion, start: Point, period: float) -> LongGrowth:
+    """Follow a small change over 300 periods, or over up to 1200 periods until its growth is clear.
+
+    On a torus the change only varies. This variation may take hundreds of periods, and looks like growth until then.
     """
     growth = Growth(motion, start, 1, np.ones(len(start.values)))
-    rates = [growth.over(_PERIODS * period)[0] / (_PERIODS * period) for _ in range(_PARTS)]
-    first, second = np.mean(np.reshape(rates, (2, -1)), axis=1)
-    return float(first), float(second)
+    logarithms = [0.0]
+    for last in (False,) * (_LONGER - 1) + (True,):
+        for _ in range(_PARTS):
+            logarithms.append(logarithms[-1] + float(growth.over(_PERIODS * period)[0]))
+        aligned = np.array(logarithms[_ALIGNED:])
+        periods = _PERIODS * (len(logarithms) - 1)
+        if not np.isfinite(aligned).all():
+            return LongGrowth(-np.inf, -np.inf, periods, False, False)
+        trend, variation = _trend(aligned)
+        exponent = trend / (_PERIODS * period * (len(aligned) - 1))
+        most = variation if last else 0.5 * variation if variation <= _SMALL else 0.0
+        is_clear = abs(trend) > (2.0 if last else _CLEAR) * variation
+        is_bounded = abs(trend) <= most
+        if last or is_clear or is_bounded:
+            break
+    halves = np.diff(aligned[[0, len(aligned) // 2, -1]])
+    # growth by a power of time becomes slower
+    is_exponential = bool(is_clear and trend > 0.0 and halves[1] > 0.5 * halves[0])
+    return LongGrowth(exponent, logarithms[-1], periods, is_exponential, is_bounded)
+
+
+def _trend(logarithms: np.ndarray) -> tuple[float, float]:
+    """Return the change of the straight line closest to some values, and the range of the values about this line."""
+    at = np.linspace(-0.5, 0.5, len(logarithms))
+    slope = float(at @ logarithms / (at @ at))
+    return slope, max(float(np.ptp(logarithms - slope * at)), _LEAST)

@@ -13,7 +13,7 @@ import numpy as np
 from hybridsim import arguments
 from hybridsim.analysis.keyword_options import refuse_unknown
 from hybridsim.analysis.steady.incommensurate import follow
-from hybridsim.analysis.steady.lyapunov import FOLLOWED, largest_exponents
+from hybridsim.analysis.steady.lyapunov import long_growth
 from hybridsim.analysis.steady.motion import (
     CostsMore,
     CostsTooMuch,
@@ -71,7 +71,6 @@ _MARGIN = 1.1  # on the expected number of periods
 _GROWS = 1.2  # a larger growth means a state that grows without end
 _TIGHTER = 1e-2  # the runs' tolerance relative to that of the steady state
 _NOTHING_LEFT = 1e-13  # of the scale that a state once had
-_NEUTRAL = 1e-3  # a smaller exponent per period is zero
 QUASI, CHAOTIC, UNSETTLED = "quasi-periodic", "chaotic", "not settled"
 
 
@@ -372,23 +371,16 @@ class _Search:
         base = self.period if self.period is not None else float(passings.times[-1] - passings.times[-2])
         # exponents need derivatives, which Python functions do not have
         has_slopes = system_of(self.motion.model).has_tape
-        first, second = math.nan, math.nan
-        if has_slopes:
-            first, second = largest_exponents(self.motion, passings.last, base)
-        exponent = 0.5 * (first + second)
-        leaving = self._leaving(passings)
-        if min(first, second) * base > _NEUTRAL and second > 0.5 * first and not leaving:
-            kind = CHAOTIC
-        elif abs(exponent) * base <= _NEUTRAL and not leaving:
-            kind = QUASI
-        else:
-            kind = UNSETTLED
-        if not has_slopes:
-            reason = "its kind is unknown, because derivatives of Python functions are unknown"
-        elif kind == UNSETTLED:
-            reason = f"over {FOLLOWED} more periods a small change {_grown(exponent * FOLLOWED * base)}"
-        else:
-            reason = f"largest Lyapunov exponent {exponent:.3g} per unit of time"
+        growth = long_growth(self.motion, passings.last, base) if has_slopes else None
+        exponent, leaving = math.nan, self._leaving(passings)
+        kind, reason = UNSETTLED, "its kind is unknown, because derivatives of Python functions are unknown"
+        if growth is not None:
+            exponent = growth.exponent
+            if not leaving and (growth.is_exponential or growth.is_bounded):
+                kind = CHAOTIC if growth.is_exponential else QUASI
+                reason = f"largest Lyapunov exponent {exponent:.3g} per unit of time"
+            else:
+                reason = f"over {growth.periods} more periods a small change {_grown(growth.logarithm)}"
         message = f"{kind} after {self.periods} periods: {reason}"
         if leaving:
             message += f", but {leaving} never returns: nothing restores it, or it only accumulates"
