@@ -18,6 +18,7 @@ SECTIONS = {
     "Validation": (
         "random-models",
         "random-structures",
+        "steady-states",
         "combined-forms",
         "faults-put-back",
         "guards",

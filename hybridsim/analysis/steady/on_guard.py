@@ -1,4 +1,4 @@
-"""This module finds periodic orbits for which the velocity of a contact, or another guard, is always zero.
+"""This module finds periodic orbits along which a guard is zero, and contacts that slip by less than the tolerance.
 
 An example is slip with the velocity zero at all times. Newton's method follows the equations of one mode, and the
 multipliers are those of this mode. A small change of such an orbit leads to another mode, so they decide nothing.
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from hybridsim.engine.record.segments import Segment
 from hybridsim.solution import Solution
 
 _ZERO = 1e-6  # of the change of a guard by the size of the motion
@@ -23,17 +24,51 @@ def lies_on_a_guard(solution: Solution, scale: np.ndarray) -> bool:
     solution : one period of the orbit.
     scale : (n + d,) size of each state and discrete state of the motion from which the orbit was found.
     """
-    system, count = solution._system, solution._system.guard_count
+    system = solution._system
     chosen = np.flatnonzero(scale[: system.n] > 0.0)
-    is_zero = np.ones(count, dtype=np.bool_)
+    is_zero = np.ones(system.guard_count, dtype=np.bool_)
     for segment in solution._segments:
         is_zero &= system.active(segment.z)
         if not is_zero.any():
             return False
         for s, x in ((segment.s[0], segment.x[0]), (segment.s[-1], segment.x[-1])):
-            points = np.repeat(x[None], 1 + len(chosen), axis=0)
-            points[1 + np.arange(len(chosen)), chosen] += scale[chosen]
-            values = system.rows("guards", count, np.full(len(points), s), points, segment.p, segment.z)
-            size = np.abs(values[1:] - values[0]).max(axis=0, initial=0.0)
-            is_zero &= (size > 0.0) & (np.abs(values[0]) <= _ZERO * size)
+            values, size = _values_and_sizes(solution, segment, float(s), x, chosen, scale)
+            is_zero &= (size > 0.0) & (np.abs(values) <= _ZERO * size)
     return bool(is_zero.any())
+
+
+def slight_slip(solution: Solution, scale: np.ndarray, most: float) -> str:
+    """Return the contact that slips between two phases of stick by less than a part of the size of its velocity, or "".
+
+    scale (n + d,): size of each state and discrete state of the motion.
+    """
+    system = solution._system
+    chosen = np.flatnonzero(scale[: system.n] > 0.0)
+    for c in system.surface_of:
+        largest, has_slipped, hold = np.inf, False, system.automata[c].hold
+        for segment in solution._segments:
+            if segment.z[c] == hold:
+                if has_slipped and largest <= most:
+                    return str(system.automata[c].name)
+                largest, has_slipped = 0.0, False  # the next slip begins from stick
+                continue
+            has_slipped = True
+            if largest > most:
+                continue
+            own = system.active(segment.z) & (system.owner == c)
+            for s, x in zip(segment.s, segment.x, strict=True):
+                values, size = _values_and_sizes(solution, segment, float(s), x, chosen, scale)
+                ratio = np.abs(values[own]) / np.where(size[own] > 0.0, size[own], np.nan)
+                largest = max(largest, float(np.nan_to_num(ratio, nan=np.inf).min(initial=np.inf)))
+    return ""
+
+
+def _values_and_sizes(
+    solution: Solution, segment: Segment, s: float, x: np.ndarray, chosen: np.ndarray, scale: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the value of each guard at x, and its largest change if one of the chosen states changes by its scale."""
+    system, count = solution._system, solution._system.guard_count
+    points = np.repeat(x[None], 1 + len(chosen), axis=0)
+    points[1 + np.arange(len(chosen)), chosen] += scale[chosen]
+    values = system.rows("guards", count, np.full(len(points), s), points, segment.p, segment.z)
+    return values[0], np.abs(values[1:] - values[0]).max(axis=0, initial=0.0)

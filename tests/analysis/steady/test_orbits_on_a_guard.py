@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from math import exp, log
+from math import exp, log, pi
+
+import pytest
 
 import hybridsim as hs
 
@@ -59,3 +61,33 @@ def test_a_drive_that_hunts_is_not_at_rest() -> None:
     assert 1.6e-3 < hunting() < 1.9e-3
     found = hs.steady_state(servo())
     assert not found.success and found.kind == "not settled"
+
+
+@pytest.mark.parametrize("tol", [1e-8, 1e-10, 1e-12])
+def test_a_contact_whose_slips_vanish_sticks(tol: float) -> None:
+    """The force of contact g reaches its limit once in a period. Its slips last 1.3 and move y by ever less.
+
+    In a plain run y moves by less than 1e-12 after 40 periods, so that in the limit g sticks throughout.
+    """
+    friction = {"mu_s": 0.8146, "mu_k": 0.4888, "v_s": 0.2}
+    model = hs.Model(
+        "two-masses",
+        parameters={"omega": 0.2625},
+        states=[
+            hs.State("x", -1.725, "v"),
+            hs.State("v", 0, "0.8041*sin(omega*t) - 0.1319*v - x - 2.021*(x - y) - f"),
+            hs.State("y", 0, "w"),
+            hs.State("w", 0, "(2.021*(x - y) - 0.3*y - 0.1319*w - g)/0.3742"),
+        ],
+        contacts=[
+            hs.Contact("f", "v", 0.7988, "stribeck", arguments=friction),
+            hs.Contact("g", "w", 0.6414, "stribeck", arguments=friction),
+        ],
+    )
+    period = 2.0 * pi / 0.2625
+    plain = hs.simulate(model, (0, 100 * period), integrator="dop853", rtol=1e-11)
+    assert abs(plain(100 * period)[2] - plain(40 * period)[2]) < 1e-12
+    found = hs.steady_state(model, tol=tol)
+    assert found.kind == "periodic" and "slips by less" not in found.message
+    assert found.stick_fraction["g"] == 1.0
+    assert found.multipliers[0] == pytest.approx(1.0, abs=1e-9)  # g may stick anywhere
