@@ -8,7 +8,7 @@ import numpy as np
 
 from hybridsim.analysis.steady.motion import Motion, Point, point_at_end
 from hybridsim.analysis.steady.on_guard import lies_on_a_guard
-from hybridsim.analysis.steady.settling import relative
+from hybridsim.analysis.steady.settling import Passings, relative
 from hybridsim.analysis.variations.off_zero import rates_of
 from hybridsim.analysis.variations.sensitivities import derivatives
 from hybridsim.arguments import SMALLEST_RTOL
@@ -21,6 +21,9 @@ _ROUNDING = 1e-14  # relative to the states' scale; no step makes the residual s
 # An orbit with a larger multiplier is not reached by waiting: it repels, or is one of a family.
 _ATTRACTS = 1.0 - 1e-6
 _DOUBLE = 1e-3  # distance of two multipliers from 1; closer ones are separated by the direction of the motion
+_CLOSE = 1e-2  # of the scale: the motion settles on a stable orbit that is so close
+_CLOSER = 0.9  # ratio of the distances in the last and the first quarter of the passages
+_COMPARED, _PREDICTED = 3, 0.05  # passages that are predicted, and the largest error relative to the distance
 
 
 @dataclass(frozen=True)
@@ -90,6 +93,39 @@ def shoot(
         if not orbit.period > 0.0:
             break
     return replace(best, converged=False)
+
+
+def is_approached(motion: Motion, orbit: Orbit, passings: Passings, is_free: bool) -> bool:
+    """Return whether the last passages approach an orbit as its derivative predicts, or are close to it.
+
+    Newton's method may reach a stable orbit on which the motion does not settle.
+    """
+    unit, away = _distances(orbit, passings)
+    away = away[: _COMPARED + 1]
+    if np.abs(away[0]).max() <= _CLOSE:
+        return True
+    solution = motion.run(orbit.start, orbit.period)
+    predicted = away[1:] @ (derivatives(solution, ()).by_start * unit[None, :] / unit[:, None]).T
+    if is_free:  # back to the section, along the flow
+        way = np.append(rates_at_end(solution), np.zeros(len(unit) - solution._system.n)) / unit
+        predicted -= np.outer(predicted[:, passings.state] / way[passings.state], way)
+    off = np.abs(predicted - away[:-1]).max(axis=1)
+    return bool((off <= _PREDICTED * np.abs(away[1:]).max(axis=1)).all())
+
+
+def is_nearing(orbit: Orbit, passings: Passings) -> bool:
+    """Return whether the last passages are closer to an orbit than the first ones, or close to it."""
+    away = np.abs(_distances(orbit, passings)[1]).max(axis=1)
+    quarter = max(len(away) // 4, 1)
+    return bool(away[0] <= _CLOSE or away[:quarter].mean() < _CLOSER * away[-quarter:].mean())
+
+
+def _distances(orbit: Orbit, passings: Passings) -> tuple[np.ndarray, np.ndarray]:
+    """Return the unit (n + d,) of each state, and the passages minus the orbit in these units, the latest first."""
+    unit = np.where(passings.scale > 0.0, passings.scale, 1.0)
+    away = (passings.values[:: -orbit.multiple] - orbit.start.values) / unit
+    away[:, passings.scale <= 0.0] = 0.0
+    return unit, away
 
 
 def followed_closely(motion: Motion, start: Orbit, scale: np.ndarray, is_free: bool) -> Orbit:

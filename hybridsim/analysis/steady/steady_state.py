@@ -38,7 +38,7 @@ from hybridsim.analysis.steady.settling import (
     is_rest,
     relative,
 )
-from hybridsim.analysis.steady.shooting import Orbit, followed_closely, shoot
+from hybridsim.analysis.steady.shooting import Orbit, followed_closely, is_approached, is_nearing, shoot
 from hybridsim.analysis.steady.shortest_period import with_shortest_period
 from hybridsim.analysis.steady.together import (
     EQUILIBRIUM,
@@ -344,7 +344,8 @@ class _Search:
 
             self._next_extrapolation = 2 * self.periods
             most = min(self.periods, _MAX_PERIODS_PER_RUN)
-            return extrapolated(self.motion, passings, self.period, self.tol, most)
+            shot = extrapolated(self.motion, passings, self.period, self.tol, most)
+            return shot if shot is None or is_nearing(shot, passings) else None
         return shot
 
     def _shot(self, passings: Passings, multiple: int) -> Orbit | None:
@@ -352,7 +353,10 @@ class _Search:
         section = None if self.period is not None else passings.state
         found = shoot(self.motion, start, passings.scale, section, self.tol)
         self.newton_steps += found.steps
-        return found if found.converged and found.attracts else None
+        is_found = found.converged and found.attracts
+        return (
+            found if is_found and is_approached(self.motion, found, passings, self.period is None) else None
+        )
 
     def _orbit(self, passings: Passings, multiple: int) -> Orbit:
         if self.period is not None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 
 import hybridsim as hs
@@ -70,3 +71,33 @@ def test_a_block_that_slips_ever_less_is_not_quasi_periodic(max_periods: int) ->
     found = hs.steady_state(model, max_periods=max_periods)
     assert found.kind in ("not settled", "equilibrium")
     assert found.solution.y[0, -1] == pytest.approx(0.6885 - 1.002, abs=0.02)
+
+
+@pytest.mark.parametrize("tol", [1e-8, 1e-10])
+def test_a_stable_orbit_that_the_motion_does_not_reach_is_not_returned(tol: float) -> None:
+    """A mass on a belt with forcing has a stable orbit of amplitude 0.44, and from x = -0.5482 a torus beyond it.
+
+    A plain run has an amplitude above 1 at all times after 20 periods.
+    """
+    model = hs.Model(
+        "belt",
+        parameters={"omega": 1.556},
+        states=[
+            hs.State("x", -0.5482, "v"),
+            hs.State("v", 0, "0.626*sin(omega*t) - 0.08172*v - x - f"),
+        ],
+        contacts=[
+            hs.Contact(
+                "f", "v - 1.329", 1, "stribeck", arguments={"mu_s": 0.6397, "mu_k": 0.2073, "v_s": 0.3593}
+            )
+        ],
+    )
+    period = 2.0 * math.pi / 1.556
+    plain = hs.simulate(model, (0, 300 * period), integrator="dop853", rtol=1e-11)
+    for k in range(20, 300, 10):
+        x = plain(np.linspace((k - 6) * period, k * period, 600))[0]
+        assert 0.5 * np.ptp(x) > 1.0
+    found = hs.steady_state(model, tol=tol, max_periods=128)
+    assert found.kind in ("quasi-periodic", "not settled")
+    near = hs.steady_state(model, x0={"x": 0.18, "v": -0.68}, tol=tol)
+    assert near.kind == "periodic" and near.amplitude["x"] == pytest.approx(0.4390042817, rel=1e-7)
