@@ -278,8 +278,8 @@ def page(done: list[dict[str, Any]]) -> str:
     out += "".join(f"| {ours} | {theirs} | {n} |\n" for (ours, theirs), n in pairs.most_common())
     minutes = sum(sum(record["seconds"]) for record in done) / 60.0
     return out + (
-        f"\nRun `python docs/studies/steady_states.py [points] [seed] [journal]` to repeat the study. It takes about "
-        f"{minutes:.0f} minutes on one core.\n"
+        f"\nRun `python docs/studies/steady_states.py [points] [seed] [journal]` to repeat the study. It takes "
+        f"about {minutes:.0f} minutes on one core.\n"
     )
 
 
