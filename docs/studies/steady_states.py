@@ -216,7 +216,7 @@ HEAD = """# Steady states against plain runs
 
 Does `hs.steady_state` find the motion that a long run reaches? Of {all} random points {agree} agree with a plain run.
 {irregular} further points have a motion that does not repeat, by both. {slow} points had not settled at the end of the
-plain run, {refused} points have no steady state by both, and {differ} points differ.
+plain run, {refused} points have no steady state by both, and the results differ at {differ}.
 
 `python docs/studies/steady_states.py` draws the numbers of {kinds} kinds of models at random, and compares two results
 for each point. One result is that of `hs.steady_state` with at most {most} periods. The other result is that of plain

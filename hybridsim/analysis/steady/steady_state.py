@@ -20,9 +20,7 @@ from hybridsim.analysis.steady.motion import (
     GrowsWithoutBound,
     Motion,
     Point,
-    point_at_end,
 )
-from hybridsim.analysis.steady.on_guard import slight_slip
 from hybridsim.analysis.steady.period_argument import (
     refuse_plain_time,
     refuse_what_ends,
@@ -36,10 +34,10 @@ from hybridsim.analysis.steady.settling import (
     forced_passings,
     free_passings,
     is_rest,
-    relative,
 )
 from hybridsim.analysis.steady.shooting import Orbit, followed_closely, is_approached, is_nearing, shoot
 from hybridsim.analysis.steady.shortest_period import with_shortest_period
+from hybridsim.analysis.steady.slight_slips import after_slight_slips
 from hybridsim.analysis.steady.together import (
     EQUILIBRIUM,
     PERIODIC,
@@ -74,9 +72,6 @@ _MARGIN = 1.1  # on the expected number of periods
 _GROWS = 1.2  # a larger growth means a state that grows without end
 _TIGHTER = 1e-2  # the runs' tolerance relative to that of the steady state
 _NOTHING_LEFT = 1e-13  # of the scale that a state once had
-_SLIGHT = 10.0  # multiple of the tolerance: a contact that slips by less may stick in the limit
-_ROUNDED = 1e-9  # the same for a tolerance near rounding, of which a small scale leaves few digits
-_LATER = (16, 64, 256)  # periods after which it is looked at again
 QUASI, CHAOTIC, UNSETTLED = "quasi-periodic", "chaotic", "not settled"
 
 
@@ -371,30 +366,13 @@ class _Search:
         steps = orbit.steps
         orbit = with_shortest_period(self.motion, orbit, self.scale, self.period is not None, self.tol)
         self.newton_steps += orbit.steps - steps
-        orbit, slight = self._after_slight_slips(orbit)
+        orbit, slight = after_slight_slips(self.motion, orbit, self.scale, self.tol)
         rests = is_rest(self.motion, orbit.start, orbit.period, self.largest, self.periods)
         kind = EQUILIBRIUM if rests else PERIODIC
         message = message_of(kind, orbit, self.period is not None)
         if slight:
             message += f"; contact {slight} slips by less than the tolerance, and may stick in the limit"
         return _found(self.motion, kind, orbit, self.period is None, self.newton_steps, self.periods, message)
-
-    def _after_slight_slips(self, orbit: Orbit) -> tuple[Orbit, str]:
-        """Return a later period in which no contact slips by less than the tolerance, or the orbit and such a contact.
-
-        A contact that slips less in each period sticks in the limit. Its slips do not become shorter.
-        """
-        later = orbit
-        for count in (0, *_LATER):
-            if count:
-                end = point_at_end(self.motion.run(later.start, count * later.period))
-                later = replace(later, start=replace(end, at=later.start.at))
-            solution = self.motion.run(later.start, later.period)
-            slight = slight_slip(solution, self.scale, max(_SLIGHT * self.tol, _ROUNDED))
-            if not slight:
-                change = point_at_end(solution).values - later.start.values
-                return (replace(later, residual=relative(change, self.scale)) if count else orbit), ""
-        return orbit, slight
 
     def _other(self, passings: Passings) -> SteadyState:
         """Use the largest Lyapunov exponent to classify a motion that does not repeat."""
