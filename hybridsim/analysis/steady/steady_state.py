@@ -36,8 +36,7 @@ from hybridsim.analysis.steady.settling import (
     is_rest,
 )
 from hybridsim.analysis.steady.shooting import Orbit, followed_closely, is_approached, is_nearing, shoot
-from hybridsim.analysis.steady.shortest_period import with_shortest_period
-from hybridsim.analysis.steady.slight_slips import after_slight_slips
+from hybridsim.analysis.steady.shortest_period import after_slight_slips, with_shortest_period
 from hybridsim.analysis.steady.together import (
     EQUILIBRIUM,
     PERIODIC,
