@@ -55,7 +55,7 @@ READERS = {
     f"{CHOICE}uniqueness.py::below_limits": "passes them to `is_below_limit`",
     "engine/events/compiled/guard_series.py::interpreted_series": "computes them",
     "engine/events/compiled/guard_series.py::guard_series": "computes them",
-    "engine/linear/guard_coefficients.py::linear_coefficient": "computes them",
+    "engine/linear/guard_coefficients.py::_row_coefficient": "computes them",
     "engine/linear/guard_coefficients.py::rough_coefficient": "computes them",
     "engine/linear/guard_coefficients.py::linear_series": "computes them",
     "engine/linear/guard_coefficients.py::_exact_series": "computes them",

@@ -18,7 +18,14 @@ from hybridsim.engine.system.system import System
 
 _FIELDS = LinearTables._fields
 _COMPUTED = ("rates", "offsets", "weights")  # fields of the atoms that depend on the parameters
-_SHARED = ("kinds", "term_start", "sources", "factors", "phases")  # fields that all points have in common
+_SHARED = (
+    "kinds",
+    "term_start",
+    "sources",
+    "factors",
+    "phases",
+    "products",
+)  # fields that all points have in common
 _HAS_MODES = np.array(
     [name not in _COMPUTED + _SHARED for name in _FIELDS]
 )  # fields with a row for each mode

@@ -72,8 +72,8 @@ def _monitors_for_python(system: System) -> str:
     corners = corners_of_monitors(system)
     if corners is None or system.n + corners.system.guard_count > _SMALL:
         return "many monitors"
-    is_linear = what_is_not_linear(corners.system) is None
-    return "" if is_linear else "monitors that are not linear in the states"
+    is_possible = what_is_not_linear(corners.system) is None
+    return "" if is_possible else "monitors that are not polynomials of the states"
 
 
 def _for_functions(system: System, x0: np.ndarray, z0: np.ndarray, span: tuple[float, float]) -> Choice:

@@ -14,20 +14,19 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from hybridsim.engine.linear.recipe import Traced, computed
+from hybridsim.engine.linear.terms import ONE, Form, Key, Monomial, Product, degree_of, joined
 from hybridsim.engine.series import operations as ops
 from hybridsim.engine.system.failures import StepFailure
 
 TIME, VALUE, ANGLE, GROWTH = range(4)  # kinds of atoms
-Factor = tuple[int, int]  # an atom's number; 1 for the cosine of an angle, else 0
-Monomial = tuple[Factor, ...]  # sorted; () is 1
-Key = int | Monomial  # a state's index, or a monomial over atoms
-Form = dict[Key, float]
 Read = Form | float  # a register that is a plain number is stored as a float
 
-_ONE: Monomial = ()
 _PAIRED = (ops.SINCOS, ops.SINHCOSH, ops.TANGENT)
 _SINGLE = (ops.NEG, ops.ABS, ops.SIGN, ops.NOT, ops.EXP, ops.SQRT, ops.SINCOS, ops.SINHCOSH, ops.TANGENT)
-_HIGHEST = 8  # largest degree of a monomial; the closure under derivatives would be large beyond it
+_HIGHEST = (
+    8  # largest degree of a monomial or product; the closure under derivatives would be large beyond it
+)
+MOST_PRODUCTS = 64  # most products of states in the guards of a model
 
 
 class NotLinear(StepFailure):
@@ -100,7 +99,7 @@ class LinearReader:
     numbers of a `hybridsim.engine.linear.recipe`. If p is None, the form must hold for any values: a
     parameter and everything computed from parameters alone is then NaN, and a condition on it cannot be read.
     A register that is a linear form in this case is one at any values, since special values can only make
-    terms vanish.
+    terms vanish. keeps_products: whether registers may be polynomials of the states.
     """
 
     def __init__(
@@ -112,8 +111,9 @@ class LinearReader:
         parameters: Iterable[tuple[int, int]],
         varying: range,
         p: Sequence[float] | None,
+        keeps_products: bool,
     ) -> None:
-        self.atoms, self.is_open = atoms, p is None
+        self.atoms, self.is_open, self._keeps_products = atoms, p is None, keeps_products
         self.forms: dict[int, Read | NotLinear] = {time: {((0, 0),): 1.0}}
         self.forms |= {register: {i: 1.0} for i, register in enumerate(states)}
         self.forms |= constants
@@ -143,6 +143,14 @@ class LinearReader:
 
     def form(self, register: int) -> Form:
         """Return the linear form of a register, or raise NotLinear."""
+        found = self.polynomial(register)
+        for key in found:
+            if isinstance(key, Product):
+                raise NotLinear(str(key))
+        return found
+
+    def polynomial(self, register: int) -> Form:
+        """Return the polynomial of a register, or raise NotLinear."""
         return _form(self._read(register))
 
     def _read(self, register: int) -> Read:
@@ -169,7 +177,7 @@ class LinearReader:
         if op in (ops.ADD, ops.SUB):
             return (_plain(_sum(_form(first), _form(second), 1.0 if op == ops.ADD else -1.0)),)
         if op == ops.MUL:
-            return (_plain(_product(_form(first), _form(second))),)
+            return (_plain(_product(_form(first), _form(second), self._keeps_products)),)
         if op == ops.DIV and isinstance(first, dict) and isinstance(second, float):
             if second == 0.0:
                 raise DividesByZero("a division by zero")
@@ -214,14 +222,14 @@ _IN_THE_WAY = {
 def _form(read: Read) -> Form:
     if isinstance(read, dict):
         return read
-    return {_ONE: read} if read != 0.0 else {}
+    return {ONE: read} if read != 0.0 else {}
 
 
 def _plain(form: Form) -> Read:
     """Convert a linear form that is a single number to this number."""
     if not form:
         return 0.0
-    return form[_ONE] if len(form) == 1 and _ONE in form else form
+    return form[ONE] if len(form) == 1 and ONE in form else form
 
 
 def _sum(a: Form, b: Form, sign: float) -> Form:
@@ -231,22 +239,20 @@ def _sum(a: Form, b: Form, sign: float) -> Form:
     return result
 
 
-def _product(a: Form, b: Form) -> Form:
-    """Return the product of two linear forms if the product is a linear form, or raise NotLinear."""
+def _product(a: Form, b: Form, keeps_products: bool) -> Form:
+    """Return the product of two forms, or raise NotLinear if it has a product of states that is not kept."""
     result: Form = {}
     for left, u in a.items():
         for right, v in b.items():
-            if isinstance(left, tuple) and isinstance(right, tuple):
-                monomial = tuple(sorted((*left, *right)))
-                if len(monomial) > _HIGHEST:
-                    raise NotLinear(f"a product of more than {_HIGHEST} functions of time")
-                _accumulate(result, monomial, u * v)
-            elif left == _ONE or right == _ONE:
-                _accumulate(result, right if left == _ONE else left, u * v)
-            elif isinstance(left, tuple) or isinstance(right, tuple):
-                raise NotLinear("a product of a state and a function of time")
-            else:
-                raise NotLinear("a product of states")
+            key = joined(left, right)
+            if degree_of(key) > _HIGHEST:
+                of = "functions of time" if isinstance(key, tuple) else "states and functions of time"
+                raise NotLinear(f"a product of more than {_HIGHEST} {of}")
+            if isinstance(key, Product) and not keeps_products:
+                raise NotLinear(str(key))
+            _accumulate(result, key, u * v)
+    if sum(isinstance(key, Product) for key in result) > MOST_PRODUCTS:
+        raise NotLinear(f"more than {MOST_PRODUCTS} products of states")
     return result
 
 
@@ -254,7 +260,7 @@ def _linear_atom(kind: int, form: Form, atoms: Atoms) -> Atom:
     """Return the basic function of an angle or exponent, which must be linear in time and free of states."""
     rate, offset, terms = 0.0, 0.0, []
     for key, weight in form.items():
-        if key == _ONE:
+        if key == ONE:
             offset = weight
         elif isinstance(key, tuple) and len(key) == 1 and atoms.known[key[0][0]].kind == TIME:
             rate = weight

@@ -21,6 +21,46 @@ def linear_coefficient(
     lin: Any, k: int, g: int, order: int, x: Any, x_error: Any, work: Any
 ) -> tuple[float, float]:
     """Return a Taylor coefficient of a guard in the modes of row `k`, with its error bound."""
+    if lin.is_polynomial[k, g] != 0:
+        return call_noinline(polynomial_coefficient, (lin, k, g, order, x, x_error, work))
+    return _row_coefficient(lin, k, g, order, x, x_error, work)
+
+
+@kernel
+def polynomial_coefficient(
+    lin: Any, k: int, g: int, order: int, x: Any, x_error: Any, work: Any
+) -> tuple[float, float]:
+    """Return a Taylor coefficient of a guard with products of states, with its error bound."""
+    value, bound = _row_coefficient(lin, k, g, order, x, x_error, work)
+    series, errors = work.product[0], work.product[1]
+    for q in range(lin.products.shape[0]):
+        if lin.shares[k, g, q] == 0.0:
+            continue
+        for m in range(order + 1):
+            series[m] = errors[m] = 0.0
+        series[0] = lin.shares[k, g, q]
+        for i in range(lin.products.shape[1]):
+            f = lin.products[q, i]
+            if f < 0:
+                break
+            for m in range(order, -1, -1):  # each coefficient needs the earlier ones as they were
+                total = error = 0.0
+                for j in range(m + 1):
+                    v, e = _row_coefficient(lin, k, f, j, x, x_error, work)
+                    term = abs(series[m - j] * v)
+                    total += series[m - j] * v
+                    error += errors[m - j] * (abs(v) + e) + abs(series[m - j]) * e + (m + 2) * UNIT * term
+                series[m], errors[m] = total, error
+        value += series[order]
+        bound += errors[order] + UNIT * (abs(value) + abs(series[order]))
+    return value, bound
+
+
+@inlined
+def _row_coefficient(
+    lin: Any, k: int, g: int, order: int, x: Any, x_error: Any, work: Any
+) -> tuple[float, float]:
+    """Return a Taylor coefficient of the linear part of a guard, with its error bound."""
     w, w_error, sizes, w_sizes, bound = work.w, work.w_error, work.sizes, work.w_sizes, 0.0
     for m in range(x.shape[0]):
         short_loop()
@@ -34,6 +74,14 @@ def linear_coefficient(
         bound += abs(lin.series[k, g, order, n + m]) * w_error[m]
     value = dot(lin.series, (k, g, order), (x, w))
     return value, bound + dot(lin.roundings, (k, g, order), (sizes, w_sizes))
+
+
+@inlined
+def guard_coefficient(lin: Any, k: int, g: int, order: int, y: Any, work: Any) -> float:
+    """Return a Taylor coefficient of a guard at the states y."""
+    if lin.is_polynomial[k, g] != 0:
+        return call_noinline(polynomial_coefficient, (lin, k, g, order, y, work.y_error, work))[0]
+    return dot(lin.series, (k, g, order), (y, work.w))
 
 
 @inlined
@@ -60,7 +108,9 @@ def measure_point(lin: Any, work: Any) -> None:
 
 @inlined
 def rough_coefficient(lin: Any, k: int, g: int, order: int, work: Any) -> tuple[float, float]:
-    """Return a Taylor coefficient of a guard, and a wide error bound that is fast to compute."""
+    """Return a Taylor coefficient of a guard, and an error bound, which is wide and fast to compute if possible."""
+    if lin.is_polynomial[k, g] != 0:
+        return call_noinline(polynomial_coefficient, (lin, k, g, order, work.x_after, work.slopes, work))
     return dot(lin.series, (k, g, order), (work.x_after, work.w)), lin.largest[k, g, order] * work.size[0]
 
 

@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from hybridsim.engine.linear.form import Atoms, Form, Monomial
+from hybridsim.engine.linear.form import Atoms
 from hybridsim.engine.linear.modes import LinearMode, NoMode, modes_of, single_changes
 from hybridsim.engine.linear.recipe import Numbers, Recipe
 from hybridsim.engine.linear.table_rows import leave_out
+from hybridsim.engine.linear.terms import Form, Key, Monomial
 from hybridsim.engine.native.kernels import Precompiled, kernel
 from hybridsim.engine.system.per_structure import per_structure
 from hybridsim.engine.system.system import System
@@ -46,26 +47,36 @@ class MatrixTemplate:
         read = modes_of(system, atoms, met, numbers.inputs, len(modes))
         modes += read
         monomials = atoms.closure({*known, *(m for mode in read for m in mode.monomials())})
+        products = sorted({product for mode in modes for product in mode.products()})
+        factors = sorted({key for product in products for key in product.factors()}, key=_order_of_factors)
         n, guards = system.n, system.guard_count
-        size = n + len(monomials)
+        size, rows = n + len(monomials), guards + len(factors)
         place: dict[Any, int] = {i: i for i in range(n)} | {m: n + k for k, m in enumerate(monomials)}
+        place |= {product: size + q for q, product in enumerate(products)}
         motion = [(place[m], atoms.derivative(m)) for m in monomials]  # the same in all modes
 
-        def entries(rows: Iterable[tuple[int, Form]]) -> Entries:
+        def entries(rows: Iterable[tuple[int, Form]], width: int) -> Entries:
             """Return the row-major positions of the matrix entries, and the registers of their values."""
-            found = [(row * size + place[k], numbers.place(w)) for row, form in rows for k, w in form.items()]
+            found = [
+                (row * width + place[k], numbers.place(w)) for row, form in rows for k, w in form.items()
+            ]
             return np.array(found, dtype=np.int64).reshape(-1, 2).T.copy()
 
-        self._n, self._shape = n, (len(met), guards, size)
+        self._n, self._shape, self._products = n, (len(met), rows, size), products
         self._monomials: list[Monomial] = monomials
-        first, self._flow, self._guards = 0, entries(()), entries(())
-        if begun is not None and begun._monomials == monomials:
+        first, self._flow, self._guards = 0, entries((), size), entries((), size)
+        if begun is not None and begun._monomials == monomials and begun._products == products:
             first, self._flow, self._guards = begun._shape[0], begun._flow, begun._guards
         new = [(k, modes[k]) for k in range(first, len(met))]
         flow = entries(
-            (k * size + row, form) for k, mode in new for row, form in [*enumerate(mode.rates), *motion]
+            ((k * size + row, form) for k, mode in new for row, form in [*enumerate(mode.rates), *motion]),
+            size,
         )
-        active = entries((k * guards + g, form) for k, mode in new for g, form in mode.guards.items())
+        of_factors: list[tuple[int, Form]] = [(guards + f, {key: 1.0}) for f, key in enumerate(factors)]
+        active = entries(
+            ((k * rows + g, form) for k, mode in new for g, form in [*mode.guards.items(), *of_factors]),
+            size + len(products),
+        )
         self._flow = np.concatenate([self._flow, flow], axis=1)
         self._guards = np.concatenate([self._guards, active], axis=1)
         used = sorted({a for m in monomials for a, _ in m})
@@ -83,6 +94,9 @@ class MatrixTemplate:
             np.array([source for source, _ in terms], dtype=np.int64),
             _factors([[2 * used.index(a) + part for a, part in m] for m in monomials], 2 * len(met_atoms)),
             np.array([system.layout.phases_at, system.layout.signals_at], dtype=np.int64),
+            _factors(
+                [[guards + factors.index(key) for key in product.factors()] for product in products], -1
+            ),
         )
         self.recipe: Recipe = Recipe(numbers, None if begun is None else begun.recipe)
 
@@ -100,10 +114,12 @@ class MatrixTemplate:
     def matrices(self, registers: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the matrices A of the flows y' = A y, the coefficients of the guards, and a mask of the usable modes.
 
-        registers (points, R): the matrices of all points are stacked along the first axis. See `leave_out`.
+        registers (points, R): the matrices of all points are stacked along the first axis. See `leave_out`. A guard has
+        coefficients of y and of the products. Further guards are the factors of products.
         """
         (count, guards, size), points = self._shape, len(registers)
-        A, rows = np.zeros((points * count, size, size)), np.zeros((points * count, guards, size))
+        A = np.zeros((points * count, size, size))
+        rows = np.zeros((points * count, guards, size + len(self._products)))
         usable = np.empty(points * count, dtype=np.bool_)
         _put_entries(registers, self._flow, self._guards, self._n, A, rows, usable)
         return A, rows, usable
@@ -111,12 +127,12 @@ class MatrixTemplate:
     def atoms(self, registers: np.ndarray) -> tuple[np.ndarray, ...]:
         """Return the basic functions of time and their monomials as arrays, in the order of `LinearTables`.
 
-        The last array is the range of angles in the run-time vector.
+        The last arrays are the range of angles in the run-time vector, and the factors of the products.
         """
-        kinds, term_start, sources, factors, angles = self._fixed
+        kinds, term_start, sources, factors, angles, products = self._fixed
         found, count = registers.take(self._computed, -1), len(kinds)
         rates, offsets, weights = found[..., :count], found[..., count : 2 * count], found[..., 2 * count :]
-        return kinds, rates, offsets, term_start, sources, weights, factors, angles
+        return kinds, rates, offsets, term_start, sources, weights, factors, angles, products
 
 
 @kernel
@@ -133,9 +149,14 @@ def put_entries(registers: Any, flow: Any, guards: Any, n: int, A: Any, rows: An
 _put_entries = Precompiled(put_entries)
 
 
+def _order_of_factors(key: Key) -> tuple[bool, Any]:
+    """Return a key for sorting, with states before functions of time."""
+    return isinstance(key, tuple), key
+
+
 def _factors(monomials: Sequence[Sequence[int]], one: int) -> np.ndarray:
-    """Return the factors of each monomial, padded with ones to equal length."""
-    factors = np.full((len(monomials), max(map(len, monomials))), one, dtype=np.int64)
+    """Return the factors of each monomial, padded to equal length with the number `one`."""
+    factors = np.full((len(monomials), max(map(len, monomials), default=0)), one, dtype=np.int64)
     for row, monomial in zip(factors, monomials, strict=True):
         row[: len(monomial)] = monomial
     return factors

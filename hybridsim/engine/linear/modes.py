@@ -3,41 +3,64 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from copy import copy
 from itertools import product
 
 import numpy as np
 
-from hybridsim.engine.linear.form import Atoms, DividesByZero, Form, LinearReader, Monomial, NotLinear, Read
+from hybridsim.engine.linear.form import (
+    MOST_PRODUCTS,
+    Atoms,
+    DividesByZero,
+    LinearReader,
+    NotLinear,
+    Read,
+)
+from hybridsim.engine.linear.terms import Form, Monomial, Product
 from hybridsim.engine.series.optimise import PAIRED, arguments_of
 from hybridsim.engine.system.per_structure import per_structure
 from hybridsim.engine.system.system import System
 from hybridsim.errors import UsageError
+from hybridsim.model.parts.component import MonitorCorner
 from hybridsim.model.toml.automata import SINGLE
 
 _MAX_CACHED = 64  # most cached answers per structure, one for each set of parameter values
 
 
+@per_structure
+def _guards_of_monitors(system: System) -> frozenset[int]:
+    """Return the guards that represent monitors; they may be polynomials of the states."""
+    components = zip(system.model.all_components(), system.automata, strict=True)
+    return frozenset(
+        int(g) for c, a in components if isinstance(c, MonitorCorner) for guards in a.guards for g in guards
+    )
+
+
 class LinearMode:
     """Linear forms of the rates and active guards in one combination of modes.
 
-    reader: the linear forms of all registers in these modes.
+    Guards that represent monitors may be polynomials. reader: the linear forms of all registers in these modes.
     """
 
     def __init__(self, system: System, reader: LinearReader, z: np.ndarray) -> None:
         tape = system.code.data["tape"]
-        rates = zip(system.names, tape["derivatives"], strict=True)
-        self.rates = [_named(reader, register, f"the rate of {name}") for name, register in rates]
-        self.guards: dict[int, Form] = {
-            g: _named(reader, tape["guards"][g], system.guard_title(g, z))
-            for g in map(int, np.flatnonzero(system.active(z)))
-        }
+        rates, of_monitors = zip(system.names, tape["derivatives"], strict=True), _guards_of_monitors(system)
+        self.rates = [_named(reader.form, register, f"the rate of {name}") for name, register in rates]
+        self.guards: dict[int, Form] = {}
+        for g in map(int, np.flatnonzero(system.active(z))):
+            read = reader.polynomial if g in of_monitors else reader.form
+            self.guards[g] = _named(read, tape["guards"][g], system.guard_title(g, z))
 
     def monomials(self) -> set[Monomial]:
         """Return the functions of time that occur in the linear forms."""
         forms = [*self.rates, *self.guards.values()]
-        return {key for form in forms for key in form if isinstance(key, tuple)}
+        found = {key for form in forms for key in form if isinstance(key, tuple)}
+        return found.union(product.monomial for product in self.products())
+
+    def products(self) -> set[Product]:
+        """Return the products of states that occur in the guards."""
+        return {key for form in self.guards.values() for key in form if isinstance(key, Product)}
 
 
 def _reader(system: System, atoms: Atoms, z: np.ndarray, p: Sequence[float] | None) -> LinearReader:
@@ -47,7 +70,10 @@ def _reader(system: System, atoms: Atoms, z: np.ndarray, p: Sequence[float] | No
     parameters = [(r, s) for r, s in tape["parameters"] if s != layout.pin_at]
     constants = [(r, v) for r, v, _ in tape["constants"]]
     constants += [(r, 1.0) for r, s in tape["parameters"] if s == layout.pin_at]
-    reader = LinearReader(atoms, tape["time"], tape["states"], constants, parameters, varying, p)
+    keeps_products = bool(_guards_of_monitors(system))
+    reader = LinearReader(
+        atoms, tape["time"], tape["states"], constants, parameters, varying, p, keeps_products
+    )
     reader.read(system.mode_rows(z))
     return reader
 
@@ -86,9 +112,9 @@ class _Changes:
         return LinearMode(self.system, reader, z)
 
 
-def _named(reader: LinearReader, register: int, title: str) -> Form:
+def _named(read: Callable[[int], Form], register: int, title: str) -> Form:
     try:
-        return reader.form(register)
+        return read(register)
     except NotLinear as reason:
         raise type(reason)(f"{title} has {reason}") from None
 
@@ -102,6 +128,10 @@ class NoMode:
 
     def monomials(self) -> set[Monomial]:
         """Return an empty set, because a mode without motion needs no functions of time."""
+        return set()
+
+    def products(self) -> set[Product]:
+        """Return an empty set, because a mode without motion has no guards."""
         return set()
 
 
@@ -184,16 +214,20 @@ def _reason_at(system: System, p: tuple[float, ...] | None) -> str | None:
         z = vectors[f"while {names} {hold} "] = vectors[""].copy()
         z[list(cluster)] = [max(system.automata[c].hold, 0) for c in cluster]
     reasons: dict[str, str] = {}
-    changes = _Changes(system, p)
+    changes, products = _Changes(system, p), set[Product]()
     for place, z in reversed(vectors.items()):
         try:
-            changes.mode(z)
+            products |= changes.mode(z).products()
         except DividesByZero:
             continue  # no such motion
         except NotLinear as reason:
             reasons[place] = str(reason)
     if not reasons:
-        return None
+        return (
+            f"monitors have more than {MOST_PRODUCTS} products of states"
+            if len(products) > MOST_PRODUCTS
+            else None
+        )
     # the mode with which no vector is linear; the other modes may not be the cause
     to_blame = (
         place

@@ -11,12 +11,11 @@ from typing import Any
 import numpy as np
 
 from hybridsim.engine.linear.form import ANGLE, GROWTH, TIME
-from hybridsim.engine.linear.guards import FARTHEST
+from hybridsim.engine.linear.guards import FARTHEST, guard_terms
 from hybridsim.engine.native.constants import BOUND_TERMS
 from hybridsim.engine.native.kernels import allocating_kernel, call_noinline, inlined, kernel
 from hybridsim.engine.native.loop_hints import index, short_loop
 from hybridsim.engine.native.simd.products import product, times
-from hybridsim.engine.native.simd.vectors import WIDTH, load, splat, store
 from hybridsim.engine.roots.certify import (
     falls_over,
     past_dip,
@@ -37,6 +36,7 @@ POINTS = 10**6
 # A damped motion grows backward, by at most exp(1) over this share of the forward range of a polynomial.
 _TURNED = 2.0  # roundings: of the speed and of its product with the time
 _BACK, _BACKWARD = 1.0 / FARTHEST, 4.0
+_EVEN = 0.5  # of the range of a polynomial: a step after which the bound of the remainder is still small
 
 
 @inlined
@@ -250,31 +250,6 @@ def state_sizes(lin: Any, k: int, before: Any, after: Any, larger: Any, scale: A
 
 
 @inlined
-def guard_terms(lin: Any, k: int, g: int, c: Any, terms: Any) -> tuple[float, float]:
-    """Write the Taylor coefficients of a guard to `terms`; return bounds of the guard and of the remainder.
-
-    The bound of the first omitted coefficient holds from here on as long as no block grows: |gamma| |B**m|
-    |c|/m!, block by block.
-    """
-    size, rest = 0.0, 0.0
-    first, second = splat(0.0), splat(0.0)  # BOUND_TERMS are two vectors
-    at = (k * lin.terms.shape[1] + g) * lin.terms.shape[2] * 2 * BOUND_TERMS
-    for j in range(lin.counts[k]):
-        short_loop()
-        real, imaginary = c[j].real, c[j].imag
-        modulus = abs(real) + abs(imaginary)
-        size += lin.sizes[k, g, j] * modulus
-        rest += lin.rests[k, g, j] * modulus
-        x, y = splat(real), splat(imaginary)
-        first = first + (load(lin.terms, at) * x - load(lin.terms, at + BOUND_TERMS) * y)
-        second = second + (load(lin.terms, at + WIDTH) * x - load(lin.terms, at + BOUND_TERMS + WIDTH) * y)
-        at += 2 * BOUND_TERMS
-    store(terms, 0, first)
-    store(terms, WIDTH, second)
-    return size, rest
-
-
-@inlined
 def first_zero_of_wave(lin: Any, k: int, g: int, c: Any, bound: float) -> tuple[int, float]:
     """Find the first zero of a guard a + r cos(omega s + phase), or OPEN if this zero is nearly double."""
     j, terms = lin.waves[k, g], lin.terms
@@ -322,14 +297,14 @@ def first_zero(lin: Any, k: int, g: int, i: int, bound: float, state: Any, scrat
         return NEVER, bound
     if side <= 0 or order >= BOUND_TERMS - 3 or not start[order] > 0.0:
         return OPEN, 0.0
-    farthest, grown, margin = lin.farthest[k, g], lin.grown[k, g], (16.0 + 2.0 * lin.counts[k]) * UNIT
+    farthest, grown, margin = lin.farthest[k, g], lin.grown[k, g], lin.margins[k, g]
     turning = _TURNED * UNIT * lin.turning[k, g]
     is_due = 0.0 < hint <= min(bound, farthest)
     if not is_due and bound <= farthest and stays_positive(start, order, grown * rest, bound, margin * size):
         return NEVER, bound
     if is_due:
         moved(lin, k, c, hint, v)
-        size_there, rest_there = guard_terms(lin, k, g, v, terms)
+        size_there, rest_there = guard_terms(lin, k, g, v, terms, scratch.products)
         margin_there = margin + turning * hint
         error = margin_there * size_there + floor
         rest_there *= _BACKWARD * grown
@@ -348,7 +323,9 @@ def first_zero(lin: Any, k: int, g: int, i: int, bound: float, state: Any, scrat
     for _ in range(POINTS // (widest * widest)):
         scratch.points[0] += widest * widest
         reach = min(bound - s, farthest)
-        d = past_dip(terms, order, reach, error, lower)
+        d = min(reach, _EVEN * farthest) if lin.is_polynomial[k, g] != 0 else 0.0
+        if d == 0.0 or not stays_positive(terms, order, grown * rest, d, margin * size):
+            d = past_dip(terms, order, reach, error, lower)
         if d == 0.0 or not stays_positive(terms, order, grown * rest, d, margin * size):
             d = safe_step(terms, order, grown * rest, reach, margin * size, lower)
         if d >= bound - s:
@@ -357,8 +334,8 @@ def first_zero(lin: Any, k: int, g: int, i: int, bound: float, state: Any, scrat
             return OPEN, s
         s += d
         moved(lin, k, c, s, v)
-        size, rest = guard_terms(lin, k, g, v, terms)
-        margin = (16.0 + 2.0 * lin.counts[k]) * UNIT + turning * s
+        size, rest = guard_terms(lin, k, g, v, terms, scratch.products)
+        margin = lin.margins[k, g] + turning * s
         error = margin * size + floor
         order, floor = 0, 0.0
         d = zero_of_terms(terms, grown * rest, size, lower)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from hybridsim.engine.linear.guards import guard_series, modal_guards
+from hybridsim.engine.linear.guards import guard_series, modal_guards, write_products
 from hybridsim.engine.native.kernels import kernel
 from hybridsim.engine.native.simd.products import LANES
 
@@ -21,7 +21,7 @@ _NEAR, _SLOWEST = 0.125, 1e-300
 def leave_out(A: Any, guards: Any, n: int, usable: Any) -> None:
     """Write a mask of the modes with finite coefficients, and set the guards of the other modes to -1.
 
-    A (K, m, m), guards (K, G, m). Two surfaces that cannot be held together give modes with numbers that are not
+    A (K, m, m), guards (K, G, m + Q). Two surfaces that cannot be held together give modes with numbers that are not
     finite, which runs have only as neighbours. In the tables their motion is NaN, so that a compiled loop stops there,
     and no state counts as resting there.
     """
@@ -31,14 +31,16 @@ def leave_out(A: Any, guards: Any, n: int, usable: Any) -> None:
         for m in range(size):
             for i in range(size):
                 usable[k] = usable[k] and abs(A[k, i, m]) < _LARGEST
-            for g in range(guards.shape[1]):
+        for g in range(guards.shape[1]):
+            for m in range(guards.shape[2]):
                 usable[k] = usable[k] and abs(guards[k, g, m]) < _LARGEST
         if usable[k]:
             continue
-        for m in range(size):
-            for i in range(n):
+        for i in range(n):
+            for m in range(size):
                 A[k, i, m] = 0.0
-            for g in range(guards.shape[1]):
+        for g in range(guards.shape[1]):
+            for m in range(guards.shape[2]):
                 guards[k, g, m] = -1.0 if m == n else 0.0  # the first function of time is 1
 
 
@@ -95,7 +97,7 @@ def write_lengths(flows: Any, lasting: Any, near: Any) -> None:
 def write_tables(A: Any, guards: Any, n: int, usable: Any, flows: Any, gamma: Any, tables: Any) -> None:
     """Write the rows of all modes to `tables`, which must contain zeros.
 
-    A (K, m, m), guards (K, G, m), usable (K,): see `leave_out`. flows: `hybridsim.engine.linear.modal.Modals`.
+    A (K, m, m), guards (K, G, m + Q), usable (K,): see `leave_out`. flows: `hybridsim.engine.linear.modal.Modals`.
     gamma (J,): scratch.
     """
     for k in range(A.shape[0]):
@@ -119,21 +121,13 @@ def write_tables(A: Any, guards: Any, n: int, usable: Any, flows: Any, gamma: An
         guards, flows, gamma, tables.terms, tables.sizes, tables.rests, tables.farthest, tables.grown, tables.turning,
         tables.waves,
     )  # fmt: skip
+    write_products(guards, flows, tables)
 
 
 @kernel
-def write_atoms(
-    kinds: Any,
-    rates: Any,
-    offsets: Any,
-    starts: Any,
-    sources: Any,
-    weights: Any,
-    factors: Any,
-    phases: Any,
-    tables: Any,
-) -> None:
-    """Write the functions of time to `tables`."""
+def write_atoms(atoms: Any, tables: Any) -> None:
+    """Write the functions of time, and the factors of the products of states, to `tables`."""
+    kinds, rates, offsets, starts, sources, weights, factors, phases, products = atoms
     for a in range(kinds.shape[0]):
         tables.kinds[a], tables.rates[a], tables.offsets[a] = kinds[a], rates[a], offsets[a]
     for a in range(starts.shape[0]):
@@ -144,3 +138,6 @@ def write_atoms(
         for d in range(factors.shape[1]):
             tables.factors[m, d] = factors[m, d]
     tables.phases[0], tables.phases[1] = phases[0], phases[1]
+    for q in range(products.shape[0]):
+        for i in range(products.shape[1]):
+            tables.products[q, i] = products[q, i]

@@ -33,8 +33,9 @@ _lock = SharedLock()
 class LinearTables(NamedTuple):
     """Arrays of linear modes for compiled loops, with one row per combination of modes.
 
-    Shapes: K mode vectors, A atoms, M monomials, G guards, J modal coordinates (even). Rows over y are padded
-    with zeros behind states and monomials. Blocks of rows are made by `hybridsim.engine.native.simd.products`.
+    Shapes: K mode vectors, A atoms, M monomials, Q products of states, G guards and factors of products, J modal
+    coordinates (even). Rows over y are padded with zeros behind states and monomials. Blocks of rows are made by
+    `hybridsim.engine.native.simd.products`.
 
     The motion is followed from one point only for a limited time (`lasting`). For example, exp(2*(t - 400))
     underflows at t = 0 and could not grow to one from there.
@@ -48,6 +49,7 @@ class LinearTables(NamedTuple):
     weights: np.ndarray  # weights of the atoms' terms
     factors: np.ndarray  # (M, D) factors of the monomials: 2*atom + part, or 2*A for a one
     phases: np.ndarray  # (2,) range of the places in p that hold rounded angles
+    products: np.ndarray  # (Q, D) factors of the products of states: rows of the guards, then -1
     series: np.ndarray  # (K, G, 4, .) Taylor coefficients of the guards as rows over y
     roundings: np.ndarray  # (K, G, 4, .) bounds of the rounding errors of series for y of size 1
     largest: np.ndarray  # (K, G, 4) largest rounding of each coefficient
@@ -71,6 +73,14 @@ class LinearTables(NamedTuple):
         np.ndarray
     )  # (K, G) fastest speed or growth rate in the guard, which amplifies roundings with time
     waves: np.ndarray  # (K, G) coordinate of a guard that is a constant plus one undamped wave, else -1
+    margins: np.ndarray  # (K, G) error bound of the guard's terms, relative to sizes
+    shares: np.ndarray  # (K, G, Q) coefficients of the products in the guards
+    is_polynomial: (
+        np.ndarray
+    )  # (K, G) 1 for a guard with products, else 0; sizes and rests are those of its linear part
+    product_rests: (
+        np.ndarray
+    )  # (K, Q) bound of the first omitted coefficient of a product of factors of size 1
     lasting: np.ndarray  # (K,) how long the motion may be followed from one point
     flows: np.ndarray  # (K, n + M, n + M) from y to its rate
     near: np.ndarray  # (K,) time up to which a state is summed from the series of flows
@@ -81,11 +91,12 @@ def no_tables() -> LinearTables:
     i, c = np.int64, np.complex128
     tables: LinearTables = packed(LinearTables(
         np.zeros(0, i), np.zeros(0), np.zeros(0), np.zeros(1, i), np.zeros(0, i), np.zeros(0), np.zeros((0, 0), i),
-        np.zeros(2, i), np.zeros((0, 0, 0, 0)), np.zeros((0, 0, 0, 0)), np.zeros((0, 0, 0)), np.zeros(0, i),
-        np.zeros((0, 0), c), np.zeros((0, 0, 0), c), np.zeros((0, 0), i), np.zeros((0, 0, 0), c),
+        np.zeros(2, i), np.zeros((0, 0), i), np.zeros((0, 0, 0, 0)), np.zeros((0, 0, 0, 0)), np.zeros((0, 0, 0)),
+        np.zeros(0, i), np.zeros((0, 0), c), np.zeros((0, 0, 0), c), np.zeros((0, 0), i), np.zeros((0, 0, 0), c),
         np.zeros((0, 0, 0, LANES)), np.zeros((0, 0, 0, LANES)), np.zeros((0, 0, 0, LANES)),
         np.zeros((0, 0, 0, LANES)), np.zeros((0, 0, 0, 0, 0)), np.zeros((0, 0, 0)), np.zeros((0, 0, 0)),
-        np.zeros((0, 0)), np.zeros((0, 0)), np.zeros((0, 0)), np.zeros((0, 0), i), np.zeros(0),
+        np.zeros((0, 0)), np.zeros((0, 0)), np.zeros((0, 0)), np.zeros((0, 0), i), np.zeros((0, 0)),
+        np.zeros((0, 0, 0)), np.zeros((0, 0), i), np.zeros((0, 0)), np.zeros(0),
         np.zeros((0, 0, 0)), np.zeros(0),
     ))  # fmt: skip
     return tables
@@ -94,11 +105,11 @@ def no_tables() -> LinearTables:
 @lru_cache(256)
 def _layout(atoms: tuple[int, ...], guards: int, n: int, size: int, widest: int, rows: int) -> ArrayLayout:
     """Return the memory layout of the tables of linear modes."""
-    i, c, (count, terms, degree) = np.int64, complex, atoms
+    i, c, (count, terms, degree, products, factors) = np.int64, complex, atoms
     wide, double, blocks = filled_up(n) + filled_up(size - n), filled_up(2 * widest), filled_up(n) // LANES
     of_atoms: list[tuple[Any, tuple[int, ...]]] = [
         (i, (count,)), (float, (count,)), (float, (count,)), (i, (count + 1,)), (i, (terms,)), (float, (terms,)),
-        (i, (size - n, degree)), (i, (2,)),
+        (i, (size - n, degree)), (i, (2,)), (i, (products, factors)),
     ]  # fmt: skip
     of_rows: list[tuple[Any, tuple[int, ...]]] = [
         (float, (guards, ORDER + 1, wide)), (float, (guards, ORDER + 1, wide)), (float, (guards, ORDER + 1)), (i, ()),
@@ -106,7 +117,8 @@ def _layout(atoms: tuple[int, ...], guards: int, n: int, size: int, widest: int,
         (float, (double // LANES, wide, LANES)), (float, (blocks, double, LANES)),
         (float, (blocks, filled_up(widest), LANES)), (float, (blocks, wide, LANES)),
         (float, (guards, widest, 2, BOUND_TERMS)), (float, (guards, widest)), (float, (guards, widest)),
-        (float, (guards,)), (float, (guards,)), (float, (guards,)), (i, (guards,)), (float, ()),
+        (float, (guards,)), (float, (guards,)), (float, (guards,)), (i, (guards,)), (float, (guards,)),
+        (float, (guards, products)), (i, (guards,)), (float, (products,)), (float, ()),
         (float, (size, size)), (float, ()),
     ]  # fmt: skip
     fields = [*of_atoms, *((dtype, (rows, *shape)) for dtype, shape in of_rows)]
@@ -146,7 +158,7 @@ class _Rows:
         return rows
 
 
-_ATOMS = LinearTables._fields[:8]  # the fields that describe functions of time
+_ATOMS = LinearTables._fields[:9]  # the fields that describe functions of time and products
 
 
 class Made(NamedTuple):
@@ -200,10 +212,11 @@ def of_matrices(
 ) -> tuple[LinearTables, _Rows]:
     """Return tables with one row per combination of modes, and their memory.
 
-    atoms: the fields that describe functions of time. A (K, m, m), guards (K, G, m), usable (K,): see `leave_out`.
+    atoms: the fields that describe functions of time and products. A (K, m, m), guards (K, G, m + Q), usable (K,): see
+    `leave_out`.
     begun: tables with the first rows. units (K, m): see `units_of`.
     """
-    count, surfaces, size = guards.shape
+    count, surfaces, size = *guards.shape[:2], A.shape[1]
     first, least = (0, 0) if begun is None else (len(begun.flows), begun.rows.form[-1])
     flows, widest = scaled_modals(A[first:], units if units is None else units[first:], horizon, least)
     if begun is not None and widest == least:
@@ -211,11 +224,13 @@ def of_matrices(
     else:
         if first:
             first, (flows, widest) = 0, scaled_modals(A, units, horizon)
-        kinds, _, _, _, sources, _, factors, _ = atoms
-        rows = _Rows(((len(kinds), len(sources), factors.shape[1]), surfaces, n, size, widest), count)
+        kinds, _, _, _, sources, _, factors, _, products = atoms
+        rows = _Rows(
+            ((len(kinds), len(sources), factors.shape[1], *products.shape), surfaces, n, size, widest), count
+        )
         rows.count = count
     if not first:
-        _write_atoms(*atoms, rows.all)
+        _write_atoms(atoms, rows.all)
     scratch = np.empty(widest, dtype=complex)
     _write_tables(A[first:], guards[first:], n, usable[first:], flows, scratch, rows.part(first, count))
     release(flows)

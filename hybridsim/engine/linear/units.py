@@ -41,7 +41,7 @@ def units_of(atoms: tuple[np.ndarray, ...], A: np.ndarray, n: int, length: float
     error relative to the coefficient. The units are powers of two, so that they cause no rounding errors.
     """
     units = np.zeros(A.shape[:2])
-    units[:, n:] = length ** _powers_of_time(*atoms)
+    units[:, n:] = length ** _powers_of_time(*atoms[:8])
     for unit, own, matrix in zip(units, A, np.abs(A), strict=True):
         fastest = np.abs(np.linalg.eigvals(own[:n, :n])).max(initial=0.0)
         reach = 1.0 / max(1.0 / length, fastest)

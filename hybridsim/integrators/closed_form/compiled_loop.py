@@ -85,6 +85,7 @@ class ClosedFormKernels(MethodKernels):
                 hints=np.zeros((max(len(tables.counts), len(self.hints)), self.system.guard_count)),
                 former=np.zeros(self.system.guard_count),
                 series=np.zeros((2, tables.flows.shape[1])),
+                products=np.zeros((3, BOUND_TERMS)),
             )
         )
 

@@ -29,14 +29,15 @@ class Exact(Integrator):
     """Closed-form motion of each linear mode, x(t) = Re(T exp(B t) c), with bounds for zeros of guards.
 
     It applies to modes that are linear in the states with constant, polynomial, exponential or sinusoidal
-    forcing, and to guards that are linear in states and forcing. The model's declaration decides this, and
-    the error for another model names the obstacle. B is block diagonal (see `hybridsim.engine.linear.modal`),
-    so that defective, oscillatory and stiff modes are treated alike. A guard that is one undamped wave has
-    its zeros in closed form. Every other guard is followed by lower bounds made of its Taylor polynomial and
-    the largest remainder, so that no zero is passed over, and its zeros are accurate to rounding. There is no
-    step and no truncation error: rtol and atol are not used. A segment with something unusual (a monitor
-    that is not linear in the states, a case decided by rounding, time running backward) is computed from its
-    Taylor series, which converges everywhere, to rounding of the states' nominal sizes. There atol is used.
+    forcing, and to guards that are linear in states and forcing. Monitors may be polynomials of the states.
+    The model's declaration decides this, and the error for another model names the obstacle. B is block
+    diagonal (see `hybridsim.engine.linear.modal`), so that defective, oscillatory and stiff modes are treated
+    alike. A guard that is one undamped wave has its zeros in closed form. Every other guard is followed by
+    lower bounds made of its Taylor polynomial and the largest remainder, so that no zero is passed over, and
+    its zeros are accurate to rounding. There is no step and no truncation error: rtol and atol are not used.
+    A segment with something unusual (a monitor that is not a polynomial of the states, a case decided by
+    rounding, time running backward) is computed from its Taylor series, which converges everywhere, to
+    rounding of the states' nominal sizes. There atol is used.
 
     When to choose it: whenever it applies. It is the fastest and the most accurate.
     """
@@ -61,7 +62,7 @@ class Exact(Integrator):
     def compiled_loop(self, system: System, tolerances: Tolerances, longest: float) -> CompiledLoop | None:
         """Return the compiled loop, or None if max_step is set, because a closed form has no steps.
 
-        The result is also None if a monitor, which the system has as a corner, is not linear.
+        The result is also None if a monitor, which the system has as a corner, is not a polynomial of the states.
         """
         is_possible = math.isinf(tolerances.max_step) and what_is_not_linear(system) is None
         return CompiledLoop(_kernels(system, tolerances, longest)) if is_possible else None

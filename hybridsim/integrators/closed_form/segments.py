@@ -18,13 +18,14 @@ from hybridsim.engine.events.compiled.known_time import (
     set_origin,
 )
 from hybridsim.engine.events.compiled.scratch import called_by
+from hybridsim.engine.linear.guard_coefficients import guard_coefficient
+from hybridsim.engine.linear.guards import guard_terms
 from hybridsim.engine.linear.motion import (
     POINTS,
     errors_of_time,
     first_zero,
     first_zero_of_wave,
     functions_of_time,
-    guard_terms,
     moved,
     slopes_of,
     state_sizes,
@@ -35,7 +36,6 @@ from hybridsim.engine.linear.motion import (
 from hybridsim.engine.native.constants import BOUND_TERMS
 from hybridsim.engine.native.kernels import call, call_noinline, inline_always, inlined
 from hybridsim.engine.native.loop_hints import index, put
-from hybridsim.engine.native.simd.products import dot
 from hybridsim.engine.roots.first_exit import FOUND, OPEN
 from hybridsim.engine.run.event_loop import (
     FOLLOWED,
@@ -48,6 +48,9 @@ from hybridsim.engine.run.event_loop import (
 )
 
 _NO_GUARD, _OPEN = -1, -2  # no guard becomes negative; undecided because of rounding
+# A polynomial turns as fast as all its factors together. Its first horizon is longer by this factor, so that another
+# guard may end the segment within it.
+_REACH = 4.0
 _DONE = -1.0  # replaces a guard's size if its first zero is known
 
 
@@ -65,6 +68,7 @@ class ClosedFormArrays(NamedTuple):
     hints: np.ndarray  # (K, G) time from entry to the last zero of a guard in this run, or 0
     former: np.ndarray  # (G,) a row of hints before the current segment
     series: np.ndarray  # (2, n + M) terms near a start
+    products: np.ndarray  # (3, BOUND_TERMS) zeros, and terms of a factor and of a product
 
 
 class ClosedFormRows(NamedTuple):
@@ -97,7 +101,7 @@ def first_exit_of(lin: Any, tapes: Any, k: int, bound: float, state: Any, own: A
                 if outcome == FOUND:
                     known, until = g, at
                 continue
-        start[BOUND_TERMS], start[BOUND_TERMS + 1] = guard_terms(lin, k, g, c, start)
+        start[BOUND_TERMS], start[BOUND_TERMS + 1] = guard_terms(lin, k, g, c, start, own.products)
         guess = math.inf
         if hints[k, g] > 0.0:
             guess = hints[k, g]
@@ -106,7 +110,7 @@ def first_exit_of(lin: Any, tapes: Any, k: int, bound: float, state: Any, own: A
         if guess < soonest:
             lead, soonest = i, guess
         if last - first > 1:
-            horizon = min(horizon, lin.farthest[k, g])
+            horizon = min(horizon, lin.farthest[k, g] * (_REACH if lin.is_polynomial[k, g] != 0 else 1.0))
     if not horizon > 0.0:
         return _OPEN, 0.0
     while True:
@@ -177,7 +181,7 @@ def closed_form_segment(
             return stopped(hints, k, former)
     if fired < 0 and until == bound:
         time = max(abs(target[0]), abs(clock[0]))
-        if call_noinline(may_vanish_linear, (lin, tapes, k, s, time, v, own.sizes, own.terms[0])):
+        if call_noinline(may_vanish_linear, (lin, tapes, k, s, time, v, own)):
             return stopped(hints, k, former)
     rows.ends[number], rows.rows[number] = s, k
     put(c, rows.coordinates[number])
@@ -188,8 +192,8 @@ def closed_form_segment(
         set_origin((ints[ORIGIN_AT], ints[PHASES_AT]), loop.rates, high, low, p)
         set_inputs(ints[SIGNALS_AT], loop.known.starts, high, low, p)
         functions_of_time(lin, 0.0, p, work.factors, work.w)
-        value = dot(lin.series, (k, fired, 0), (y, work.w))
-        slope = dot(lin.series, (k, fired, 1), (y, work.w))
+        value = guard_coefficient(lin, k, fired, 0, y, work)
+        slope = guard_coefficient(lin, k, fired, 1, y, work)
         if abs(value) > s_error * abs(slope) and slope != 0.0 and math.isfinite(value / slope):
             s_error = abs(value / slope)
         errors_of_time(lin, s_error, work.factors, work.w_error)

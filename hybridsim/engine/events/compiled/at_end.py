@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Any
 
 from hybridsim.engine.events.compiled.after_segment import STAGES, fill_guard_series
-from hybridsim.engine.linear.motion import guard_terms
+from hybridsim.engine.linear.guards import guard_size, guard_terms
 from hybridsim.engine.native.kernels import inlined, kernel
 from hybridsim.engine.series.bounded import UNIT
 
@@ -52,18 +52,16 @@ def may_vanish(
 
 
 @kernel
-def may_vanish_linear(
-    lin: Any, tapes: Any, k: int, s: float, time: float, v: Any, sizes: Any, terms: Any
-) -> bool:
+def may_vanish_linear(lin: Any, tapes: Any, k: int, s: float, time: float, v: Any, own: Any) -> bool:
     """Return whether a guard of linear modes may be close to zero at the modal coordinates `v`.
 
-    terms (TERMS,): scratch.
+    own: `hybridsim.integrators.closed_form.segments.ClosedFormArrays`, with the sizes of the coordinates.
     """
+    terms = own.terms[0]
     for i in range(tapes.active_start[k], tapes.active_start[k + 1]):
-        g, size = tapes.active[i], 0.0
-        guard_terms(lin, k, g, v, terms)
-        for j in range(lin.counts[k]):
-            size += lin.sizes[k, g, j] * sizes[j]
+        g = tapes.active[i]
+        guard_terms(lin, k, g, v, terms, own.products)
+        size = guard_size(lin, k, g, own.sizes)
         size += abs(terms[1]) * (s + time) + abs(terms[2]) * s * s + abs(terms[3]) * s * s * s
         rises = terms[1] * min(lin.farthest[k, g], max(s, time)) > 2.0 * _NEAR * size
         if size > 0.0 and not (abs(terms[0]) > _NEAR * size or rises):

@@ -73,6 +73,7 @@ class EventScratch(NamedTuple):
     w_error: np.ndarray  # their error bounds
     sizes: np.ndarray  # sizes (n,) of the states
     w_sizes: np.ndarray  # sizes of the monomials
+    product: np.ndarray  # Taylor coefficients (2, 4) of a product of states, and their error bounds
     before: np.ndarray  # this and the next six, as well as the last three: see `JudgedEvent`
     now: np.ndarray
     is_zero: np.ndarray
@@ -172,6 +173,7 @@ def work_space(system: Any, atoms: int = 0, monomials: int = 0) -> EventScratch:
             w_error=vector_of(monomials),
             sizes=vector_of(system.n),
             w_sizes=vector_of(monomials),
+            product=np.zeros((2, ORDER + 1)),
             before=numbers(count),
             now=numbers(count),
             is_zero=flags(guards),
