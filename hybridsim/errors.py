@@ -160,11 +160,16 @@ class ModelError(HybridsimError):
         )
 
     @classmethod
-    def collect(cls, errors: Iterable[ModelError], title: str) -> ModelError:
-        """Return a single error itself, or combine several errors into one error that lists them by line."""
+    def collect(cls, errors: Iterable[ModelError], title: str, own: str | None = None) -> ModelError:
+        """Return a single error itself, or combine several errors into one error that lists them by file and line.
+
+        Errors in the model's own file come last, because errors in the files of its laws and parts may cause them.
+        """
         # errors with equal texts are reported once
         every = {str(single): single for error in errors for single in error.errors}
-        found = sorted(every.values(), key=_line)
+        files = list(dict.fromkeys(_file(single) for single in every.values()))
+        order = {file: (file == own, k) for k, file in enumerate(files)}
+        found = sorted(every.values(), key=lambda single: (order[_file(single)], _line(single)))
         if len(found) == 1:
             return found[0]
         message = "\n".join([f"{title}: {len(found)} errors", *(str(error) for error in found)])
@@ -266,6 +271,10 @@ def nearest(name: str, known: Iterable[str], *, kind: str = "names") -> str:
         return f"there are no {kind}"
     shown = ", ".join(names[:12]) + (f", ... ({len(names)} in all)" if len(names) > 12 else "")
     return f"known {kind}: {shown}"
+
+
+def _file(error: HybridsimError) -> str | None:
+    return error.place.file if error.place else None
 
 
 def _line(error: HybridsimError) -> int:

@@ -101,7 +101,7 @@ def test_the_page_on_own_laws_runs_and_keeps_them_short(tmp_path: Path) -> None:
         assert len(text.splitlines()) < 30
         model = hs.Model.from_toml(text)
         solutions.append(hs.simulate(model, (0, model.duration_value() or 1)))
-    assert [sol.status for sol in solutions] == ["finished"] * 4
+    assert [sol.status for sol in solutions] == ["finished"] * 5
     code = "\n".join(blocks(page, "python"))
     script = tmp_path / "shown.py"
     script.write_text(code.replace("fading.png", (tmp_path / "fading.png").as_posix()), encoding="utf-8")

@@ -109,14 +109,16 @@ POINTS = table(
         "values": said("one value, or with `across` one row, for each number in `at`", {"type": "array"}),
         "over": said("the argument; the speed v if not given", TEXT),
         "interpolation": {"enum": ["cubic", "linear"]},
-        "across": said("the second argument of a table of two", TEXT), "across_at": NUMBERS,
+        "across": said("the second argument of a table of two", TEXT), "across_at": NUMBERS, "unit": UNIT,
     }
 ) | {"anyOf": [{"required": ["at", "values"]}, {"required": ["file"]}]}  # fmt: skip
-NAMES = {"type": "array", "items": {"anyOf": [TEXT, EXPRESSIONS]}}
+PARAMETER_OF_LAW = short(EXPRESSION, table({"value": said("its default", EXPRESSION), "unit": UNIT}))
+DEFAULTS = {"type": "object", "additionalProperties": PARAMETER_OF_LAW}
+NAMES = {"type": "array", "items": {"anyOf": [TEXT, DEFAULTS]}}
 LAW = table(
     {
         "title": TEXT, "source": TEXT,
-        "parameters": said("names, or names with their defaults", {"anyOf": [NAMES, EXPRESSIONS]}),
+        "parameters": said("names, or names with defaults and units", {"anyOf": [NAMES, DEFAULTS]}),
         "slip": said("magnitude of the force at the speed v >= 0 under the load N", EXPRESSION),
         "stick": said("largest force at rest", EXPRESSION),
         "slip_backward": said("slip, where the other direction differs", EXPRESSION),
@@ -201,6 +203,7 @@ POINTS_IN_TIME = {
     "kind": {"const": "table"}, "times": NUMBERS, "values": NUMBERS, "file": CSV,
     "columns": {"type": "array"}, "interpolation": {"enum": ["linear", "cubic", "previous"]}, "unit": UNIT,
     "time_unit": said("unit of the times, which are converted to seconds", TEXT),
+    "phase": said("a delay", EXPRESSION),
 }  # fmt: skip
 INPUT = {"oneOf": [table(keys, ("kind",)) for keys in (WAVE, CHIRP, POINTS_IN_TIME, HELD, CONNECTED)]}
 OF_ELEMENT = {

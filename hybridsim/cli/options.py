@@ -55,7 +55,7 @@ def add_model_arguments(parser: argparse.ArgumentParser, optional: bool = False)
         action="append",
         default=[],
         help="set a parameter (for a state or a held input use --x0); VALUE may be an expression of other parameters, "
-        "such as 'omega=0.6*sqrt(k/m)'",
+        "such as 'omega=0.6*sqrt(k/m)'; CONTACT.NAME=VALUE sets an argument of the friction law of a contact",
     )
     add_repeated(
         parser,

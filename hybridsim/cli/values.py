@@ -142,7 +142,8 @@ def end_time(model: Model, text: str | None, default_periods: int = DEFAULT_PERI
 def _record_end(model: Model) -> float:
     """Return the time at which the longest table or chirp ends, or 0 if the model has neither."""
     values = model.parameter_values()
-    ends = [signal.times[-1] for signal in model.inputs if signal.kind == "table"]
+    delays = {s.name: 0.0 if s.phase is None else evaluate(s.phase, values) for s in model.inputs}
+    ends = [s.times[-1] + delays[s.name] for s in model.inputs if s.kind == "table"]
     ends += [evaluate(signal.duration, values) for signal in model.inputs if signal.duration is not None]
     return max([0.0, *ends])
 

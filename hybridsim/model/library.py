@@ -204,13 +204,20 @@ def _packaged_law(name: str) -> FrictionLaw:
     return law_of_text(read_text(path), str(path))[0]
 
 
+def is_packaged(law: FrictionLaw) -> bool:
+    """Return whether a law was read from a file of the package, which its users do not change."""
+    file = law.place.file if law.place else None
+    return file is not None and Path(file).parent == models_folder() / "laws"
+
+
 def law_of_text(text: str, path: str) -> tuple[FrictionLaw, list[str]]:
     """Return the only law in the text of a file, and all files from which the law was read."""
-    from hybridsim.model.toml.laws import read_laws
+    from hybridsim.model.toml.laws import KEYS, read_laws
     from hybridsim.model.toml.read import open_text
 
     root = open_text(text, path, "the file of a law")
-    root.only("schema", "look", "laws")
+    keys = [key for key in root.data if key in KEYS]
+    root.only_in("schema", "look", "laws", others=keys, remedy="write the line [laws.NAME] above them")
     laws = read_laws(root, Path(path).parent)
     if not root.source.errors and len(laws) != 1:
         names = f": {', '.join(laws)}" if laws else ""

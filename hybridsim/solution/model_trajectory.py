@@ -9,15 +9,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridsim.engine.record.time_lookup import Frame, locate_times
-from hybridsim.expr.evaluate import evaluate
-from hybridsim.expr.grammar import TIME
 from hybridsim.presentation.readable import cost_text
 from hybridsim.solution.by_name import ByName
 from hybridsim.solution.event import ModeInterval, counted_kind
 from hybridsim.solution.files.tabulated import SegmentConstants, at_steps, constants_of, tabulated
 from hybridsim.solution.model_events import ModelEvents
 from hybridsim.solution.run import Run
-from hybridsim.solution.run_trajectory import relative_velocity
+from hybridsim.solution.run_trajectory import contacts_without_stick, relative_velocity, velocity_of
 
 if TYPE_CHECKING:
     from hybridsim.engine.record.block_list import SegmentBlockList
@@ -130,14 +128,24 @@ class ModelTrajectory(ModelEvents):
     def quantities(self) -> tuple[str, ...]:
         """Return the names of outputs, inputs and definitions, discrete states and relative velocities."""
         common = (q for q in self.system.quantities if " in " not in q)
-        return (*common, *(d.name for d in self.model.discrete), *self._velocities)
+        return (
+            *common,
+            *(d.name for d in self.model.discrete),
+            *self._velocities,
+            *self._velocities_without_stick,
+        )
 
     @cached_property
     def _velocities(self) -> dict[str, int]:
-        """The relative velocities of contacts by name, each with its index among the surfaces."""
+        """The relative velocities of contacts with stick by name, each with its index among the surfaces."""
         contacts = {contact.name for contact in self.model.contacts}
         components = [self.system.automata[c].name for c in self.system.surface_of]
         return {relative_velocity(name): k for k, name in enumerate(components) if name in contacts}
+
+    @cached_property
+    def _velocities_without_stick(self) -> dict[str, Contact]:
+        """The contacts without stick by the names of their relative velocities."""
+        return contacts_without_stick(self.model, self._velocities)
 
     def own_values(self, name: str) -> np.ndarray:
         """Return the values of a quantity at the steps of the run."""
@@ -162,20 +170,8 @@ class ModelTrajectory(ModelEvents):
         """Return the friction force times the relative velocity (k, contacts) of each contact at times (k,)."""
         contacts = self.model.contacts
         forces = self.values_of([contact.name for contact in contacts], times, "+")
-        return forces.T * np.column_stack([self._relative_velocity(c, times) for c in contacts])
-
-    def _relative_velocity(self, contact: Contact, times: np.ndarray) -> np.ndarray:
-        name = relative_velocity(contact.name)
-        if name in self._velocities:
-            return self.values(name, times, "+")
-        # Without a surface, as for a law with a direct force, the expression itself is evaluated.
-        names = [n for n in contact.velocity.names if n in self.names or n in self.quantities]
-        rows = dict(zip(names, self.values_of(names, times, "+").tolist(), strict=True)) | {
-            TIME: times.tolist()
-        }
-        known = self.model.parameter_values()
-        here = (known | {name: row[k] for name, row in rows.items()} for k in range(len(times)))
-        return np.array([evaluate(contact.velocity, values) for values in here])
+        speeds = self.values_of([relative_velocity(contact.name) for contact in contacts], times, "+")
+        return forces.T * speeds.T
 
     def values_at(
         self, names: Sequence[str], segment: Segment | SegmentConstants, s: np.ndarray, x: np.ndarray
@@ -186,6 +182,9 @@ class ModelTrajectory(ModelEvents):
         if any(name in self._velocities for name in names):
             rows = system.rows("surfaces", len(system.surface_of), s, x, segment.p, segment.z)
             found |= {name: rows[:, k] for name, k in self._velocities.items() if name in names}
+        for name, contact in self._velocities_without_stick.items():
+            if name in names:
+                found[name] = velocity_of(contact, self, segment, s, x)
         others = [name for name in names if name not in found]
         found |= dict(zip(others, self.values_in(others, segment, s, x), strict=True))
         return [found[name] for name in names]

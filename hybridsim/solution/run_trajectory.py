@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any, Protocol
+from collections.abc import Collection, Sequence
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from hybridsim.engine.record.segments import Segment
+from hybridsim.expr import evaluate
+from hybridsim.expr.grammar import TIME
+from hybridsim.model import Contact, Model
 from hybridsim.presentation.tables import Table
 from hybridsim.solution.event import Event, ModeInterval
+from hybridsim.solution.files.tabulated import SegmentConstants
+
+if TYPE_CHECKING:
+    from hybridsim.solution.model_trajectory import ModelTrajectory
 
 
 def relative_velocity(contact: str) -> str:
@@ -85,3 +93,25 @@ class RunTrajectory(Protocol):
 
     def summary(self) -> list[str]:
         """Return the lines of a summary that come between the message and the warnings."""
+
+
+def contacts_without_stick(model: Model, with_stick: Collection[str]) -> dict[str, Contact]:
+    """Return the contacts by the names of their relative velocities, except those with a surface for stick."""
+    contacts = {relative_velocity(contact.name): contact for contact in model.contacts}
+    return {name: contact for name, contact in contacts.items() if name not in with_stick}
+
+
+def velocity_of(
+    contact: Contact,
+    trajectory: ModelTrajectory,
+    segment: Segment | SegmentConstants,
+    s: np.ndarray,
+    x: np.ndarray,
+) -> np.ndarray:
+    """Return the relative velocity (k,) of a contact at local times (k,) and states (k, n) of a segment."""
+    names = [n for n in contact.velocity.names if n in trajectory.names or n in trajectory.quantities]
+    times = segment.p[trajectory.system.layout.origin_at] + s
+    columns = [*trajectory.values_at(names, segment, s, x), times]
+    known = trajectory.model.parameter_values()
+    rows = zip(*(column.tolist() for column in columns), strict=True)
+    return np.array([evaluate(contact.velocity, known | dict(zip((*names, TIME), row))) for row in rows])

@@ -10,7 +10,6 @@ import numpy as np
 from hybridsim.arguments import as_times, side_of_event
 from hybridsim.calls import refusing
 from hybridsim.errors import UsageError, nearest
-from hybridsim.solution.run_trajectory import relative_velocity
 
 if TYPE_CHECKING:
     from hybridsim.solution.run_trajectory import RunTrajectory
@@ -85,7 +84,7 @@ class States:
     def output(self, name: str, t: Any = None, side: str = "+") -> np.ndarray:
         """Return a quantity over time: a state, output, input, definition, or variable of a mode.
 
-        ``v_rel(f)`` is the relative velocity of a contact f that can stick. A `MechanicalSystem` has the force
+        ``v_rel(f)`` is the relative velocity of a contact f. A `MechanicalSystem` has the force
         of each contact and impact by its name; with ``moreau`` it is the mean over a step. ``gap(p)`` is the
         gap of one of its impacts.
 
@@ -101,11 +100,10 @@ class States:
         """
         known = (*self.names, *self.quantities)
         if not isinstance(name, str) or name not in known:
-            remedy = nearest(str(name), known, kind="quantities")
-            for contact in self.model.contacts:
-                if str(name) == relative_velocity(contact.name):
-                    remedy = f"declare it as an output: {contact.velocity.text}"
-            raise UsageError(f"model {self.model.name} has no quantity {name!r}", remedy=remedy)
+            raise UsageError(
+                f"model {self.model.name} has no quantity {name!r}",
+                remedy=nearest(str(name), known, kind="quantities"),
+            )
         if t is None and self._grid is None:
             return self._trajectory.own_values(name)
         requested = self.t if t is None else t

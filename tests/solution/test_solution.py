@@ -139,16 +139,19 @@ def test_the_velocity_of_a_contact() -> None:
     assert of_model.output(name, t[:200]) == pytest.approx(of_arrays.output(name, t[:200]), abs=1e-8)
 
 
-def test_the_velocity_of_a_contact_elsewhere() -> None:
+def test_the_velocity_of_a_contact_without_stick() -> None:
     law = hs.FrictionLaw("rubber", force="0.5*N*tanh(10*v)")
     block = hs.Model(
         "block",
         states=[hs.State("v", 1, "-f")],
-        contacts=[hs.Contact("f", velocity="v - 0.1", normal="1", law=law)],
+        contacts=[hs.Contact("f", velocity="v - w*t + belt", normal="1", law=law)],
+        parameters={"w": 0.1},
+        definitions={"belt": "0.2*v"},
     )
-    with pytest.raises(UsageError) as caught:
-        hs.simulate(block, (0, 1)).output("v_rel(f)")
-    assert caught.value.remedy == "declare it as an output: v - 0.1"
+    sol = hs.simulate(block, (0, 1))
+    t = np.linspace(0, 1, 11)
+    assert sol.output("v_rel(f)", t) == pytest.approx(1.2 * sol.output("v", t) - 0.1 * t, abs=1e-14)
+    assert sol.output("v_rel(f)", 0.0) == 1.2
     with pytest.raises(hs.ExpressionError) as fault:
         hs.Output("slip", "v_rel(f)")
     assert (
@@ -176,3 +179,11 @@ def test_repr_says_how_it_went(ball: hs.Solution) -> None:
     text = repr(ball)
     for word in ("bouncing-ball", "finished", "transition", "steps"):
         assert word in text
+
+
+def test_the_velocity_of_a_contact_without_stick_has_no_derivatives() -> None:
+    law = hs.FrictionLaw("rubber", force="0.5*N*tanh(10*v)")
+    block = hs.Model("m", [hs.State("v", 1, "-f")], contacts=[hs.Contact("f", "2*v", "1", law)])
+    with pytest.raises(UsageError, match=r"v_rel\(f\) has no derivatives") as caught:
+        hs.sensitivities(hs.simulate(block, (0, 1))).at(0.5, "v_rel(f)")
+    assert caught.value.remedy == "declare an output with the value 2*v"

@@ -98,7 +98,7 @@ def _final(
 
 def _other_times(system: System, t: float) -> list[float]:
     """Return the times at which a load is compared with its present value."""
-    times = [time for declared in system.model.inputs for time in declared.times]
+    times = [float(knot) for signal in system.signals for knot in signal.knots]
     period = common_period(system)
     return times if period is None else [*times, *(t + period * k / _SAMPLES for k in range(1, _SAMPLES))]
 

@@ -8,6 +8,7 @@ from typing import Any
 
 from hybridsim.analysis.compare.comparison_request import mapping, run_span
 from hybridsim.analysis.keyword_options import refuse_unknown
+from hybridsim.analysis.laws.labels import details_of, distinct_labels, refuse_equal
 from hybridsim.analysis.laws.law_comparison import LawComparison, LawRow
 from hybridsim.analysis.laws.law_readings import law_readings
 from hybridsim.analysis.sweep.run_readings import remedy_for_definition
@@ -18,7 +19,8 @@ from hybridsim.errors import UsageError
 from hybridsim.model import FrictionLaw, Model
 from hybridsim.simulate import simulate
 
-Entry = str | FrictionLaw | tuple[str | FrictionLaw, Mapping[str, Any]]
+_LAW = str | PathLike | FrictionLaw
+Entry = str | PathLike[str] | FrictionLaw | tuple[str | PathLike[str] | FrictionLaw, Mapping[str, Any]]
 _LAWS = "use a list of names, laws, and pairs (law, parameters), such as ['coulomb', ('viscous', {'c': 2})]"
 
 
@@ -38,6 +40,7 @@ def compare_laws(
     """Run a model under several friction laws in one contact, and measure each run.
 
     A model with periodic forcing is measured over the last period of the run, any other model over the whole run.
+    ``keep="all"`` measures the whole run of any model.
 
     Parameters
     ----------
@@ -59,7 +62,8 @@ def compare_laws(
     params, x0 : mapping of str to float, optional
         Parameter values and initial values by name, instead of the declared values.
     **options : object
-        Options of `simulate`, such as ``integrator`` and ``rtol``, but not ``keep`` and ``t_eval``.
+        Options of `simulate`, such as ``integrator`` and ``rtol``, but not ``t_eval``. ``keep`` is the measured part of
+        the run: "all", or "last-period" of the forcing, the default for a model with periodic forcing.
 
     Returns
     -------
@@ -75,7 +79,7 @@ def compare_laws(
     [2, 2]
     """
     refuse_unknown([simulate], options)
-    for name in ("keep", "save", "t_eval"):
+    for name in ("save", "t_eval"):
         if name in options:
             raise UsageError(f"compare_laws() has no option `{name}`", remedy=f"remove `{name}`")
     model = chosen_model(model, params).with_start(**mapping(x0, "x0")).validate()
@@ -89,17 +93,30 @@ def compare_laws(
     models = models_under(model, laws, contact)
     period = forcing_period(model)
     t0, t1 = run_span(t_span, model.duration_value(), period)
-    is_last_period = period is not None and t1 - t0 > period
-    if is_last_period:
-        options |= {"keep": period}
-    readings = law_readings(measure, models.values(), period if is_last_period else None)
+    measured = measured_period(options.pop("keep", None), period, t1 - t0)
+    if measured is not None:
+        options |= {"keep": measured}
+    readings = law_readings(measure, models.values(), measured)
     rows = []
     for label, changed in models.items():
         run = simulate(changed, (t0, t1), **options)
-        rows.append(LawRow(label, changed, run, contact, quantity, is_last_period, readings.of(run)))
-    measured = (t1 - period, t1) if is_last_period and period is not None else (t0, t1)
+        rows.append(LawRow(label, changed, run, contact, quantity, measured is not None, readings.of(run)))
+    interval = (t0 if measured is None else t1 - measured, t1)
     title = model.title or model.name
-    return LawComparison(title, contact, quantity, measured, tuple(rows), readings.names)
+    return LawComparison(title, contact, quantity, interval, tuple(rows), readings.names)
+
+
+def measured_period(keep: Any, period: float | None, length: float) -> float | None:
+    """Return the period that is measured at the end of a run of some length, or None for the whole run."""
+    if keep not in (None, "all", "last-period"):
+        raise cannot_be("keep", keep, "use 'all' or 'last-period', the part of the run that is measured")
+    if keep == "all":
+        return None
+    if keep == "last-period" and (period is None or not length > period):
+        found = "the model has no period" if period is None else f"the period is {period:g}"
+        remedy = f"use keep='all', since {found}" + ("" if period is None else ", or a longer t_span")
+        raise cannot_be("keep", keep, remedy)
+    return period if period is not None and length > period else None
 
 
 def contact_of(model: Model, contact: Any) -> str:
@@ -117,21 +134,18 @@ def models_under(model: Model, laws: Iterable[Entry], contact: str) -> dict[str,
     """Return the model with each of the laws, by a unique label for each law."""
     if not is_row(laws):
         raise cannot_be("laws", laws, _LAWS)
-    found: dict[str, Model] = {}
+    found: list[Model] = []
+    details = []
     for entry in laws:
         pair = entry if isinstance(entry, tuple) else (entry, {})
-        if len(pair) != 2 or not isinstance(pair[0], str | FrictionLaw) or not isinstance(pair[1], Mapping):
+        if len(pair) != 2 or not isinstance(pair[0], _LAW) or not isinstance(pair[1], Mapping):
             raise cannot_be("an entry of `laws`", entry, _LAWS)
         law, values = pair
-        changed = model.with_law(contact, law, **values)
-        label = next(c.law.name for c in changed.contacts if c.name == contact)
-        if label in found and values:
-            label += f" ({', '.join(f'{name}={value}' for name, value in values.items())})"
-        if label in found:
-            raise UsageError(
-                f"`laws` contains '{label}' twice", remedy="pass the law with different parameters"
-            )
-        found[label] = changed
+        found.append(model.with_law(contact, law, **values))
+        details.append(details_of(law, values))
     if not found:
         raise cannot_be("laws", laws, _LAWS)
-    return found
+    contacts = [next(one for one in changed.contacts if one.name == contact) for changed in found]
+    names = [one.law.name for one in contacts]
+    refuse_equal(contacts, names)
+    return dict(zip(distinct_labels(names, details), found, strict=True))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,11 +17,12 @@ from hybridsim.analysis.fit.residuals import Residuals
 from hybridsim.analysis.fit.result import Fit
 from hybridsim.analysis.fit.unknown import Unknown
 from hybridsim.analysis.laws.compare_laws import Entry, contact_of, models_under
+from hybridsim.analysis.laws.labels import details_of, distinct_labels, refuse_equal
 from hybridsim.analysis.laws.law_fits import LawFit, LawFits
 from hybridsim.arguments import cannot_be, chosen_model, is_row
 from hybridsim.calls import refusing
 from hybridsim.errors import ModelError, SimulationError, UsageError
-from hybridsim.model import Model, Parameter
+from hybridsim.model import Contact, Model, Parameter
 
 _LAWS = "use a list of names, laws, and pairs (law, parameters), such as [('coulomb', {'mu': (0.1, 0.9)})]"
 
@@ -107,13 +108,12 @@ def fit_laws(
         raise cannot_be("laws", laws, _LAWS)
     fitted, held = records_of(records), () if held_out is None else records_of(held_out)
     shared = mapping(unknowns, "unknowns")
+    declared = [_declared(model, contact, entry) for entry in laws]
+    names = [each.contact.law.name for each in declared]
+    refuse_equal([(each.contact, each.unknowns) for each in declared], names)
+    labels = distinct_labels(names, [each.details for each in declared])
     rows: list[LawFit] = []
-    for entry in laws:
-        label, changed, own = _declared(model, contact, entry, [row.label for row in rows])
-        if label in [row.label for row in rows]:
-            raise UsageError(
-                f"`laws` contains '{label}' twice", remedy="pass the law with different fixed parameters"
-            )
+    for label, (_, changed, own, _) in zip(labels, declared, strict=True):
         if not {**shared, **own}:
             raise UsageError(
                 f"the law '{label}' has no unknown",
@@ -140,13 +140,17 @@ def fit_laws(
     return LawFits(model.title or model.name, contact, tuple(rows))
 
 
-def _declared(
-    model: Model, contact: str, entry: Any, taken: Sequence[str]
-) -> tuple[str, Model, dict[str, Unknown]]:
-    """Return the label of a friction law, the model with this law, and the unknowns of the law.
+class _DeclaredLaw(NamedTuple):
+    """The contact with a friction law, the model with this contact, the unknowns, and details for the label."""
 
-    The label contains the fixed parameters if the name of the law is `taken`.
-    """
+    contact: Contact
+    model: Model
+    unknowns: dict[str, Unknown]
+    details: tuple[str, ...]
+
+
+def _declared(model: Model, contact: str, entry: Any) -> _DeclaredLaw:
+    """Return the model with a friction law in a contact, and the unknowns of the law."""
     law, values = entry if isinstance(entry, tuple) and len(entry) == 2 else (entry, {})
     if not isinstance(values, Mapping):
         raise cannot_be("an entry of `laws`", entry, _LAWS)
@@ -171,10 +175,10 @@ def _declared(
         values_of_law[name] = f"{contact.replace('.', '_')}_{name}"
         own[values_of_law[name]] = unknown
         more.append(Parameter(values_of_law[name], guess))  # type: ignore[arg-type]  # it is converted
-    fixed = ", ".join(f"{name}={value}" for name, value in values.items() if values_of_law[name] not in own)
+    fixed = {name: value for name, value in values.items() if values_of_law[name] not in own}
     widened = replace(model, parameters=(*model.parameters, *more))
     try:
-        ((label, changed),) = models_under(widened, [(law, values_of_law)], contact).items()
+        (changed,) = models_under(widened, [(law, values_of_law)], contact).values()
     except ModelError as error:
         if not more:
             raise
@@ -183,7 +187,8 @@ def _declared(
             f"{error.message}, with the first guess {guesses}",
             remedy=f"{error.remedy}; hs.Unknown(low, high, guess=...) sets a guess",
         ) from error
-    return (f"{label} ({fixed})" if label in taken and fixed else label), changed, own
+    under = next(one for one in changed.contacts if one.name == contact)
+    return _DeclaredLaw(under, changed, own, details_of(law, fixed))
 
 
 def _rank(row: LawFit) -> tuple[float, float]:

@@ -76,7 +76,7 @@ class LawComparison(Readable):
     contact, quantity : str
         The contact that has the laws, and the quantity whose amplitude is measured.
     t_span : tuple of float
-        The measured interval: the last period of the forcing, or the whole run of a model without a period.
+        The measured interval: the last period of the forcing, or the whole run.
     rows : tuple of LawRow
         One row per law with its ``label``, ``model``, ``solution`` and measures. ``measured`` contains the readings
         by name. A reading is None if the run failed, or if the law lacks it. ``residual`` tells how closely the
@@ -144,13 +144,19 @@ class LawComparison(Readable):
             for row in self.rows
         ]
 
-    def plot(self) -> Any:
+    def plot(self, x: str | None = None) -> Any:
         """Draw the friction loops of all laws, beside a bar chart of the amplitudes or of the first measure.
 
         Returns the axes; ``hybridsim.plot.save`` writes them to a file.
+
+        Parameters
+        ----------
+        x : str, optional
+            Quantity along the axis of the loops, such as "v" or the relative velocity "v_rel(f)"; by default the
+            quantity of the comparison.
         """
         # The plot package is a layer above this one, so it is imported only on demand.
-        return import_module("hybridsim.plot").law_comparison(self)
+        return import_module("hybridsim.plot").law_comparison(self, x)
 
 
 def _change(row: LawRow) -> str:

@@ -12,6 +12,7 @@ from hybridsim.analysis.variations.values.vector_slopes import VectorSlopes
 from hybridsim.engine.record.segments import Segment
 from hybridsim.engine.series.dual_numbers import Dual, differentiated_rows, values_and_slopes
 from hybridsim.engine.system.system import System
+from hybridsim.errors import UsageError
 from hybridsim.solution import Solution
 
 
@@ -61,6 +62,12 @@ class QuantityDerivatives:
 
     def _place(self, name: str, z: np.ndarray) -> int:
         """Return the index of a quantity. A variable that modes set has one index for each mode."""
+        without_stick = self._trajectory._velocities_without_stick
+        if name in without_stick:
+            raise UsageError(
+                f"{name} has no derivatives, because the contact has no stick",
+                remedy=f"declare an output with the value {without_stick[name].velocity.text}",
+            )
         known = self.system.quantities
         modes = [f"{a.name}.{a.modes[m]}" for a, m in zip(self.system.automata, z, strict=True)]
         special = [f"{name} in {mode}" for mode in modes if f"{name} in {mode}" in known]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left, bisect_right
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 
 import numpy as np
@@ -31,7 +31,7 @@ class Signal:
         self.shape = declared.shape
         self._number = {name: evaluate(e, values) for name, e in declared.expressions.items()}
         if self.kind == "table":
-            self._knots, self._coefficients = _table(declared)
+            self._knots, self._coefficients = _table(declared, self._number.get("phase", 0.0))
             self._rows: np.ndarray | None = None  # the knots and the pieces, made at first use
         elif self.kind == "step":
             self._first, self._turns, self._period = step_turns(self._number, declared)
@@ -78,6 +78,11 @@ class Signal:
         if not ahead_of:
             return None
         return min(ahead_of, key=float) if forward else max(ahead_of, key=float)
+
+    @property
+    def knots(self) -> Sequence[Instant]:
+        """Return the knots of a table; other inputs have none."""
+        return self._knots if self.kind == "table" else ()
 
     @property
     def is_polynomial(self) -> bool:
@@ -244,8 +249,8 @@ def _exact(instant: Instant) -> Fraction:
     return Fraction(instant.high) + Fraction(instant.low)
 
 
-def _table(declared: Input) -> tuple[list[Instant], list[tuple[float, float, float, float]]]:
-    """Return the knots of a table, and the cubic polynomials before, between and after the knots."""
+def _table(declared: Input, delay: float) -> tuple[list[Instant], list[tuple[float, float, float, float]]]:
+    """Return the knots of a delayed table, and the cubic polynomials before, between and after the knots."""
     times, values = np.array(declared.times), np.array(declared.values)
     if declared.interpolation == "cubic":
         from scipy.interpolate import CubicSpline
@@ -259,4 +264,4 @@ def _table(declared: Input) -> tuple[list[Instant], list[tuple[float, float, flo
             slopes = np.where(np.diff(times) > 0.0, np.diff(values) / np.diff(times), 0.0)
         rows = [(float(v), float(m), 0.0, 0.0) for v, m in zip(values, slopes, strict=False)]
     first, last = (float(values[0]), 0.0, 0.0, 0.0), (float(values[-1]), 0.0, 0.0, 0.0)
-    return [Instant(float(t)) for t in times], [first, *rows, last]
+    return [Instant(float(t)).plus(delay) for t in times], [first, *rows, last]

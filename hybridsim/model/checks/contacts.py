@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
+import ast
+from collections.abc import Collection
+from dataclasses import dataclass
+from difflib import get_close_matches
+
+from hybridsim.errors import near, nearest
+from hybridsim.expr import Expression
 from hybridsim.model.checks.names import check_identifier
 from hybridsim.model.checks.scope import Scope
 from hybridsim.model.laws.law import FORCE, INDEX, LOAD_RATE, NORMAL, SPEED, FrictionLaw
 from hybridsim.model.parts.contact import Contact
+from hybridsim.model.parts.declared import Declared
 
 # Keys of a law in TOML, which a parameter of a law cannot be called.
 _KEYS = (
@@ -28,19 +36,24 @@ def check_contacts(scope: Scope) -> None:
         _contact(scope, contact)
         if contact.law not in checked:
             checked.append(contact.law)
-            check_law(scope, contact.law)
+            check_law(scope, contact.law, contact.arguments)
 
 
-def check_law(scope: Scope, law: FrictionLaw) -> None:
-    """Report names in a law other than `v`, `N`, `dN` and the names that the law declares."""
+def check_law(scope: Scope, law: FrictionLaw, passed: Collection[str] = ()) -> None:
+    """Report names in a law other than `v`, `N`, `dN` and the names that the law declares.
+
+    passed : names of the values that a contact passes.
+    """
     what = f"law {law.name}"
     names = _own_names(scope, law)
     known = names | {SPEED, NORMAL, LOAD_RATE} | ({INDEX} if law.copies else set())
     parameters = frozenset(law.parameters)
     at_rest = {t.name for t in law.tables if t.is_at_rest}
-    used: set[str] = set()
+    used = {name for _, expr in law.expressions() for name in expr.names}
+    used |= {name for value in law.parameters.values() if value is not None for name in value.names}
+    foreign = _ForeignName(known, frozenset(passed), parameters - used - {law.copies})
+    count = len(scope.errors)
     for field, expr in law.expressions():
-        used |= expr.names
         if field.endswith(", when"):
             continue  # a condition, which is checked with the automaton of the contact
         if field in _AT_REST:
@@ -53,17 +66,65 @@ def check_law(scope: Scope, law: FrictionLaw) -> None:
             allowed = parameters | {SPEED}
         else:
             allowed = known
-        scope.need_own(expr, f"{what}, {field}", allowed)
+        _need_own(scope, expr, f"{what}, {field}", allowed, foreign)
     for name, value in law.parameters.items():
         if value is not None:
-            scope.need_own(value, f"{what}, parameter {name}", parameters)
-            used |= value.names
-    for name in sorted(parameters - used - {law.copies}):
+            _need_own(scope, value, f"{what}, parameter {name}", parameters, foreign)
+    # a parameter that seems unused may be the misspelt name of an error above
+    for name in sorted(foreign.unused if len(scope.errors) == count else ()):
         where = "neither in 'slip' nor in 'stick'" if law.is_set_valued else "nowhere in the law"
+        default = law.parameters[name]
         scope.fail(
-            law, f"{what}: the parameter '{name}' is used {where}", f"use or remove the parameter '{name}'"
+            law if default is None else Declared(place=default.place or law.place),
+            f"{what}: the parameter '{name}' is used {where}",
+            f"use or remove the parameter '{name}'",
         )
     _form(scope, law, what)
+
+
+@dataclass(frozen=True)
+class _ForeignName:
+    """What the remedy for a wrong name in a law depends on.
+
+    Parameters
+    ----------
+    known : names that some expression of the law can use.
+    passed : names of the values that a contact passes.
+    unused : parameters that no expression uses.
+    """
+
+    known: frozenset[str]
+    passed: frozenset[str]
+    unused: frozenset[str]
+
+    def remedy(self, name: str, allowed: Collection[str]) -> str:
+        """Return the remedy for a name that is not one of the allowed names."""
+        listed = f"allowed here: {', '.join(sorted(allowed)) or 'numbers'}"
+        if name in self.known:
+            return listed
+        if name in self.passed:
+            return f"add '{name}' to the `parameters` of the law"
+        if close := get_close_matches(name, sorted(self.unused & set(allowed)), n=1, cutoff=0.4):
+            return f"did you mean '{close[0]}'?"
+        if near(name, allowed):
+            return nearest(name, allowed)
+        return f"{listed}; to pass another quantity, add '{name}' to the `parameters` of the law"
+
+
+def _need_own(
+    scope: Scope, expr: Expression, what: str, allowed: Collection[str], foreign: _ForeignName
+) -> None:
+    """Report names that an expression of a law cannot use, and conditions."""
+    nodes = [n for n in ast.walk(expr.tree) if isinstance(n, ast.Name) and n.id in expr.names - set(allowed)]
+    if nodes:
+        node = min(nodes, key=lambda node: getattr(node, "col_offset", 0))
+        known = node.id in foreign.known
+        reason = f"'{node.id}' cannot be used here" if known else f"unknown name '{node.id}'"
+        message = f"{what}: {reason}"
+        scope.errors.append(expr.error(message, node=node, remedy=foreign.remedy(node.id, allowed)))
+    elif expr.is_boolean:
+        remedy = "write an expression with a numeric value"
+        scope.errors.append(expr.error(f"{what}: '{expr.text}' is a condition", remedy=remedy))
 
 
 def _own_names(scope: Scope, law: FrictionLaw) -> frozenset[str]:

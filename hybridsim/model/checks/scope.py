@@ -158,19 +158,6 @@ class Scope(Findings):
                 fault.message, place=fault.place, remedy=f"{fault.remedy}; {hint}"
             ) from None
 
-    def need_own(self, expr: Expression, what: str, known: Iterable[str]) -> None:
-        """Report an error for names of the model, and for conditions, in an expression of a friction law."""
-        foreign = sorted(expr.names - frozenset(known))
-        if foreign or expr.is_boolean:
-            reason = f"unknown name '{foreign[0]}'" if foreign else f"'{expr.text}' is a condition"
-            remedy = (
-                f"allowed here: {', '.join(sorted(known))}; pass other quantities as parameters of the law"
-                if foreign
-                else "write an expression with a numeric value"
-            )
-            fault = expr.error(f"{what}: {reason}", node=None, remedy=remedy)
-            self.errors.append(fault)
-
     def reached(self, expr: Expression) -> frozenset[str]:
         """Return the names that an expression depends on, including the names in its definitions."""
         definitions = dict(self.model.definitions)

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from hybridsim.errors import nearest
-from hybridsim.expr import Expression, evaluate, parse, parse_reset, substitute
+from hybridsim.expr import Expression, parse, parse_reset, substitute
 from hybridsim.model.elements.element import Element
 from hybridsim.model.elements.guard_direction import without_directions
 from hybridsim.model.elements.quantizer_readers import refuse_readers
@@ -194,17 +194,16 @@ class _Forms:
                 "set `clock` and `ticks` to delay a sampled value, or approximate the delay by further states; `time` "
                 "delays inputs of kind 'table' and 'wave'",
             )
-        if signal.kind == "wave":
-            assert signal.phase is not None
-            later = substitute(parse("phase + time", element.place), {"phase": signal.phase, "time": time})
-            self.inputs.append(replace(signal, name=element.name, phase=later, place=element.place))
-        elif not time.is_number:
+        varying = sorted(time.names - {parameter.name for parameter in self.model.parameters})
+        if varying:
             raise element.error(
-                f"{title}: the delay of a table cannot be '{time.text}'", "use a number for `time`"
+                f"{title}: the delay '{time.text}' depends on '{varying[0]}', which is not a parameter",
+                "use a number or an expression of parameters: a delay cannot change during a run",
             )
-        else:
-            times = tuple(at + evaluate(time, {}) for at in signal.times)
-            self.inputs.append(replace(signal, name=element.name, times=times, place=element.place))
+        later = time
+        if signal.phase is not None:
+            later = substitute(parse("phase + time", element.place), {"phase": signal.phase, "time": time})
+        self.inputs.append(replace(signal, name=element.name, phase=later, place=element.place))
 
 
 def _jumping(model: Any) -> dict[str, str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
+from hybridsim.errors import nearest
 from hybridsim.expr import Expression
 from hybridsim.model.laws.law_table import LawTable
 from hybridsim.model.parts.component import Mode
@@ -60,6 +61,8 @@ class FrictionLaw(Declared):
         and its index ``i`` = 1, 2, ...; the force is the sum.
     tables : sequence of LawTable, optional
         Named functions of one argument, defined by points.
+    units : mapping of str to str, optional
+        Units of parameters and of values of tables, by name, for the check of units.
     place : Place, optional
         Place of the declaration, for error messages.
 
@@ -88,6 +91,7 @@ class FrictionLaw(Declared):
     initial: str | None = None
     copies: str | None = None
     tables: tuple[LawTable, ...] = ()
+    units: Mapping[str, str] = field(default_factory=FrozenMap)
 
     def __post_init__(self) -> None:
         self._texts("name", "initial", "copies")
@@ -105,6 +109,7 @@ class FrictionLaw(Declared):
         self._parts("states", State)
         self._parts("modes", Mode)
         self._parts("tables", LawTable)
+        self._units()
         if self.initial is None and len(self.modes) == 1:
             object.__setattr__(self, "initial", self.modes[0].name)
         forms = [name for name in ("slip", "stick") if getattr(self, name) is not None]
@@ -118,6 +123,19 @@ class FrictionLaw(Declared):
                 "the law has `force` together with `slip` or `stick`",
                 "set either both `slip` and `stick`, or `force`",
             )
+
+    def _units(self) -> None:
+        """Check that the units are texts, each of a parameter or a table."""
+        units: object = self.units
+        texts = units.items() if isinstance(units, Mapping) else [(None, None)]
+        if not all(isinstance(name, str) and isinstance(text, str) for name, text in texts):
+            raise self._fault(f"`units` cannot be {units!r}", 'use a dict such as {"v_s": "m/s"}')
+        known = [*self.parameters, *(table.name for table in self.tables)]
+        for name in self.units:
+            if name not in known:
+                remedy = nearest(name, known, kind="parameters and tables of the law")
+                raise self._fault(f"`units` contains {name!r}", remedy)
+        object.__setattr__(self, "units", FrozenMap({name: u for name, u in self.units.items() if u}))
 
     @property
     def is_set_valued(self) -> bool:

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import replace
+from functools import partial
 from numbers import Real
+from os import PathLike
 from typing import Any, TypeVar
 
 from hybridsim.errors import ExpressionError, Place, UsageError, nearest
 from hybridsim.expr import Expression, parse
 from hybridsim.model.laws.law import FrictionLaw
 from hybridsim.model.parts.contact import Contact
-from hybridsim.model.parts.quantities import Discrete, State
+from hybridsim.model.parts.quantities import Discrete, Parameter, State
+from hybridsim.model.parts.remedies import remedy_for_value
 
 Part = TypeVar("Part", State, Discrete)
 
@@ -35,12 +38,18 @@ def require_known(
     model: str,
     remedy: Callable[[str], str],
 ) -> None:
-    """Raise an error for a changed quantity that the model does not have, or for an invalid value."""
+    """Raise an error for an invalid value, or for a changed quantity that the model does not have."""
+    require_values(changes, kind)
+    for name in changes:
+        if name not in allowed:
+            raise UsageError(f"the model '{model}' has no {kind} '{name}'", remedy=remedy(name))
+
+
+def require_values(changes: Mapping[str, Any], kind: str) -> None:
+    """Raise an error for a value that is neither a number nor an expression."""
     for name, value in changes.items():
         if not isinstance(value, _VALUES):
             raise UsageError(f"{kind} {name} cannot be {value!r}", remedy="use a number or an expression")
-        if name not in allowed:
-            raise UsageError(f"the model '{model}' has no {kind} '{name}'", remedy=remedy(name))
 
 
 def with_starts(parts: Iterable[Part], changes: Mapping[str, Any]) -> tuple[Part, ...]:
@@ -66,7 +75,7 @@ def started(
 def with_law(
     model: Any,
     name: str,
-    law: FrictionLaw | str,
+    law: FrictionLaw | str | PathLike[str],
     passed: Mapping[str, Any],
     states_of: Callable[[Contact], Iterable[State]],
 ) -> Any:
@@ -86,7 +95,33 @@ def with_law(
     return copy.validate()
 
 
-def under_law(contact: Contact, law: FrictionLaw | str, passed: Mapping[str, Any]) -> Contact:
+def with_arguments(model: Any, changes: Mapping[str, Any]) -> tuple[Any, Mapping[str, Any]]:
+    """Return a copy of a model with changed arguments of laws, by names such as "brake.mu", and the other changes."""
+    parameters, rest = model._positions().keys(), dict(changes)
+    if rest.keys() <= parameters:
+        return model, changes
+    for contact in model.contacts:
+        names = {own: f"{contact.name}.{own}" for own in contact.law.parameters}
+        passed = {own: rest.pop(name) for own, name in names.items() if name in rest.keys() - parameters}
+        if passed:
+            require_values({names[own]: value for own, value in passed.items()}, "argument")
+            model = model.with_law(contact.name, contact.law, **passed)
+    return model, rest
+
+
+def changed_parameters(model: Any, changes: Mapping[str, Any]) -> tuple[tuple[Parameter, ...], bool]:
+    """Return the parameters of a model with changed values, and whether all changes are from number to number."""
+    positions = model._positions()
+    require_known(changes, positions, "parameter", model.name, partial(remedy_for_value, model))
+    parameters, are_numbers = list(model.parameters), True
+    for name in changes:
+        former, value = parameters[positions[name]], changed_value(changes, name)
+        parameters[positions[name]] = former.with_value(value)
+        are_numbers = are_numbers and former.value.is_constant and value.is_number
+    return tuple(parameters), are_numbers
+
+
+def under_law(contact: Contact, law: FrictionLaw | str | PathLike[str], passed: Mapping[str, Any]) -> Contact:
     """Return the contact with another law; parameters that are not passed keep their values."""
     fresh = Contact(contact.name, contact.velocity, contact.normal, law)  # type: ignore[arg-type]  # loads a name
     law, title = fresh.law, f"contact {contact.name}"

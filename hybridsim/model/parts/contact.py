@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from os import PathLike
 
 from hybridsim.errors import ModelError, nearest
 from hybridsim.expr import Expression, parse, substitute
@@ -34,8 +35,8 @@ class Contact(Declared):
         Relative velocity, an expression of states, inputs, parameters and t.
     normal : str or float
         Normal load, >= 0. A guard ends the run if a varying load becomes negative.
-    law : FrictionLaw or str
-        A `FrictionLaw`, or the name of a packaged law.
+    law : FrictionLaw, str or path
+        A `FrictionLaw`, the name of a packaged law, or the path of a file with a law.
     arguments : mapping of str to str or float, optional
         Values of the law's parameters, numbers or expressions of the model's names. Missing ones have the defaults of
         the law.
@@ -72,7 +73,7 @@ class Contact(Declared):
         self._flags("opens")
         self._sizes("nominal")
         law: object = self.law
-        if isinstance(law, str):
+        if isinstance(law, str | PathLike):
             from hybridsim.model.library import load_law
 
             object.__setattr__(self, "law", load_law(law))
@@ -265,17 +266,20 @@ class Contact(Declared):
         law = self.law
         for name, value in self.arguments.items():
             if name not in law.parameters:
+                remedy = nearest(name, law.parameters, kind="parameters of the law")
+                if any(name in expr.names for _, expr in law.expressions()):
+                    remedy = f"add '{name}' to the `parameters` of the law"
                 raise ModelError(
                     f"contact {self.name}: the law '{law.name}' has no parameter '{name}'",
                     place=value.place or self.place,
-                    remedy=nearest(name, law.parameters, kind="parameters of the law"),
+                    remedy=remedy,
                 )
         own = {**law.parameters, **self.arguments}
         missing = [name for name, value in own.items() if value is None]
         if missing:
             raise self.error(
                 f"contact {self.name}: the law '{law.name}' needs a value for '{missing[0]}'",
-                f'write law = {{ name = "{law.name}", {missing[0]} = ... }}',
+                f"add {missing[0]} = ... to the law of the contact, or a default to the law",
             )
         defaults = {
             name: value for name, value in law.parameters.items() if name not in self.arguments and value

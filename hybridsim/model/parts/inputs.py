@@ -28,7 +28,7 @@ REQUIRED = {
     "connected": (),
 }
 OPTIONAL = {
-    "table": ("interpolation", "unit", "time_unit"),
+    "table": ("interpolation", "phase", "unit", "time_unit"),
     "wave": ("amplitude", "phase", "offset", "duty", "unit"),
     "chirp": ("amplitude", "phase", "unit"),
     "held": ("value", "unit"),
@@ -49,7 +49,7 @@ class Input(Declared):
     table
         Values at increasing times with linear or natural cubic interpolation, and constant beyond both ends. Two equal
         times make a jump (linear only). With "previous" each value holds until the next time, where it jumps; such a
-        table becomes a linear one with jumps.
+        table becomes a linear one with jumps. ``phase`` is a delay in time.
     wave
         offset + amplitude s((t - phase)/period), s of period 1; ``phase`` is a delay in time.
         square: +1 for a fraction below ``duty`` (0.5), else -1; sine: sin(2 pi tau); triangle: 0 at 0, 1 at 1/4, -1 at

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from os import PathLike
 from typing import Any, ClassVar
 
 from hybridsim.errors import ModelError, UsageError
@@ -17,7 +18,7 @@ from hybridsim.model.elements.requirement import Requirement
 from hybridsim.model.flattening.flatten import flattened
 from hybridsim.model.laws.law import FrictionLaw
 from hybridsim.model.laws.law_with_states import ContactState
-from hybridsim.model.parts.changes import changed_value, require_known, started, with_law, with_starts
+from hybridsim.model.parts import changes as changing
 from hybridsim.model.parts.component import Component, Corner
 from hybridsim.model.parts.contact import Contact
 from hybridsim.model.parts.declared import Declared
@@ -25,7 +26,7 @@ from hybridsim.model.parts.impact import Impact
 from hybridsim.model.parts.inputs import Input, held_as_discrete
 from hybridsim.model.parts.monitor import Monitor
 from hybridsim.model.parts.quantities import Discrete, Output, Parameter, State
-from hybridsim.model.parts.remedies import remedy_for_parameter, remedy_for_state
+from hybridsim.model.parts.remedies import remedy_for_state
 from hybridsim.model.parts.schedule import Schedule
 from hybridsim.model.parts.shape import Shape
 from hybridsim.model.parts.switching import SwitchingSurface
@@ -223,7 +224,8 @@ class Model(Declared):
         Parameters
         ----------
         **changes : str or float
-            New values of parameters, numbers or expressions of other parameters.
+            New values of parameters, numbers or expressions of other parameters. ``"brake.mu"`` is the argument mu of
+            the law of contact brake, an expression of any names of the model.
 
         Returns
         -------
@@ -237,27 +239,27 @@ class Model(Declared):
         ExpressionError
             For a value that is not a valid expression.
         """
-        positions = self._positions()
-        require_known(changes, positions, "parameter", self.name, partial(remedy_for_parameter, self))
-        parameters, are_numbers = list(self.parameters), True
-        for name in changes:
-            former, value = parameters[positions[name]], changed_value(changes, name)
-            parameters[positions[name]] = former.with_value(value)
-            are_numbers = are_numbers and former.value.is_constant and value.is_number
+        model, others = changing.with_arguments(self, changes)
+        if model is not self:
+            return model.with_(**others)
+        parameters, are_numbers = changing.changed_parameters(self, changes)
         if not are_numbers:
-            return self._valued(parameters=tuple(parameters))
+            return self._valued(parameters=parameters)
         known = {"_unnumbered": self._unnumbered, "_renumbered": self._renumbered.union(changes)}
-        return self._valued(parameters=tuple(parameters), **known)
+        return self._valued(parameters=parameters, **known)
 
     def with_start(self, /, **changes: Expression | str | float) -> Model:
         """Return a copy with changed initial values of (discrete) states: ``model.with_start(x=0.1)``."""
         names = [*(part.name for part in self.states), *(part.name for part in self.discrete)]
-        require_known(changes, names, "state", self.name, partial(remedy_for_state, self))
-        contacts = tuple(started(contact, changes, self._brought_by) for contact in self.contacts)
-        states, discrete = with_starts(self.states, changes), with_starts(self.discrete, changes)
+        changing.require_known(changes, names, "state", self.name, partial(remedy_for_state, self))
+        contacts = tuple(changing.started(contact, changes, self._brought_by) for contact in self.contacts)
+        states, discrete = (
+            changing.with_starts(self.states, changes),
+            changing.with_starts(self.discrete, changes),
+        )
         return self._valued(states=states, discrete=discrete, contacts=contacts)
 
-    def with_law(self, contact: str, law: FrictionLaw | str, /, **parameters: Any) -> Model:
+    def with_law(self, contact: str, law: FrictionLaw | str | PathLike[str], /, **parameters: Any) -> Model:
         """Return a checked copy with another law in a contact: ``model.with_law("f", "stribeck", v_s=0.1)``.
 
         A parameter that is not passed keeps the value that the contact gives it now. Otherwise it has its default.
@@ -266,12 +268,12 @@ class Model(Declared):
         ----------
         contact : str
             Name of the contact.
-        law : FrictionLaw or str
+        law : FrictionLaw, str or path
             A `FrictionLaw`, the name of a packaged law, or the path of a file with a law.
         **parameters : str or float
             Values of parameters of the law, numbers or expressions of the model's names.
         """
-        changed: Model = with_law(self, contact, law, parameters, self._brought_by)
+        changed: Model = changing.with_law(self, contact, law, parameters, self._brought_by)
         return changed
 
     def with_values_of(self, other: Model) -> Model:
@@ -476,7 +478,7 @@ class Model(Declared):
 
         errors = find_errors(self)
         if errors:
-            raise ModelError.collect(errors, f"model {self.name}")
+            raise ModelError.collect(errors, f"model {self.name}", self.path)
         self._unnumbered.setdefault("sound", (self._values, self._renumbered))
         return self
 

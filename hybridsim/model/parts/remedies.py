@@ -8,23 +8,40 @@ from hybridsim.errors import nearest
 from hybridsim.model.parts.inputs import HeldInput
 
 
-def remedy_for_parameter(model: Any, name: str, others: tuple[str, ...] = ()) -> str:
+def remedy_for_value(model: Any, name: str) -> str:
+    """Return the remedy for a changed value whose name is neither a parameter nor an argument of a law."""
+    arguments = [f"{contact.name}.{own}" for contact in model.contacts for own in contact.law.parameters]
+    remedy = nearest(name, arguments)
+    return (
+        remedy
+        if "." in name and "did you mean" in remedy
+        else remedy_for_parameter(model, name, is_value=True)
+    )
+
+
+def remedy_for_parameter(
+    model: Any, name: str, others: tuple[str, ...] = (), *, is_value: bool = False
+) -> str:
     """Return the remedy for a name that is neither a parameter nor one of the allowed `others`.
 
     The remedy is the way in which the quantity of that name can be set, the argument of a law to change, or similar
-    names.
+    names. With `is_value` an argument of a law may be set as well.
     """
     names = [parameter.name for parameter in model.parameters]
     for contact in model.contacts:
-        if name not in contact.law.parameters:
+        own = name.removeprefix(f"{contact.name}.")
+        if own not in contact.law.parameters:
             continue
-        argument = contact.arguments.get(name, contact.law.parameters[name])
+        argument = contact.arguments.get(own, contact.law.parameters[own])
         if argument is not None and argument.text in names:
-            return f"contact {contact.name} has '{name} = {argument.text}'; change '{argument.text}'"
+            return f"contact {contact.name} has '{own} = {argument.text}'; change '{argument.text}'"
         text = "its default" if argument is None else argument.text
+        subject = f"'{own}' is an argument of the law of contact {contact.name} with the value {text}"
+        if is_value:
+            return f"{subject}; write {contact.name}.{own}"
         return (
-            f"'{name}' is an argument of the law of contact {contact.name} with the value {text}; declare a "
-            f'parameter, {name} = {text} under [parameters], and write law = {{ ..., {name} = "{name}" }}'
+            f"{subject}; declare a parameter, {own} = {text} under [parameters], and write "
+            f'law = {{ ..., {own} = "{own}" }}'
         )
     for part in (*model.states, *model.discrete):
         if name == part.name:

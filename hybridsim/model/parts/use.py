@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from numbers import Integral
+from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 from hybridsim.errors import ExpressionError
@@ -114,7 +115,7 @@ class Use(Declared):
         if isinstance(value, LawOfUse):
             return value
         law, values = value if isinstance(value, tuple) and len(value) == 2 else (value, {})
-        if isinstance(law, str):
+        if isinstance(law, str | PathLike):
             from hybridsim.model.library import load_law
 
             law = load_law(law)

@@ -121,13 +121,7 @@ def _of_file(table: Table, folder: Path) -> FrictionLaw | None:
 
 
 def _law(name: str, table: Table, arguments: Iterable[str], folder: Path) -> FrictionLaw | None:
-    declared: Any = table.data.get("parameters", {})
-    parameters: dict[str, Expression | None] = {}
-    if isinstance(declared, list):
-        for index, item in enumerate(declared):
-            parameters.update(_listed(table, item, index))
-    else:
-        parameters.update(table.expressions("parameters"))
+    parameters, units = _parameters(table)
     for argument in arguments:
         parameters.setdefault(argument, None)
     force = table.expression("force")
@@ -141,6 +135,7 @@ def _law(name: str, table: Table, arguments: Iterable[str], folder: Path) -> Fri
     modes = dict(table.entries("modes", "mode"))
     marked = [mode for mode, part in modes.items() if part.flag("initial")]
     texts = {key: table.text(key) for key in ("initial", "copies") if key in table.data}
+    tables = tuple(_tables(table, folder, units))
     try:
         return FrictionLaw(
             name,
@@ -157,7 +152,8 @@ def _law(name: str, table: Table, arguments: Iterable[str], folder: Path) -> Fri
             modes=tuple(read_mode(mode, part) for mode, part in modes.items()),
             initial=texts.get("initial", marked[0] if marked else None),
             copies=texts.get("copies"),
-            tables=tuple(_tables(table, folder)),
+            tables=tables,
+            units=units,
             place=table.place,
         )
     except UsageError as fault:
@@ -173,9 +169,10 @@ def _states(law: Table) -> Iterator[State]:
         yield State(name, start, der, table.text("unit"), table.real("nominal"), place=table.place)
 
 
-def _tables(law: Table, folder: Path) -> Iterator[LawTable]:
+def _tables(law: Table, folder: Path, units: dict[str, str]) -> Iterator[LawTable]:
+    """Yield the tables of a law, and add the units of their values to the units of the law."""
     for name, table in law.entries("tables", f"{law.kind}, table"):
-        table.only(*_POINTS, "over", "interpolation", "across", "across_at", "file", "columns")
+        table.only(*_POINTS, "over", "interpolation", "across", "across_at", "file", "columns", "unit")
         across = table.expression("across")
         if "file" in table.data:
             if across is not None:
@@ -203,15 +200,27 @@ def _tables(law: Table, folder: Path) -> Iterator[LawTable]:
                 across_at=table.numbers("across_at"),
                 place=table.place,
             )
+            units[name] = table.text("unit")
         except UsageError as fault:
             table.fail(fault.message.partition(": ")[2], fault.remedy or "")
 
 
-def _listed(table: Table, item: Any, index: int) -> dict[str, Expression | None]:
-    """Return one entry of a list of parameters: a name without default, or names with defaults."""
-    if isinstance(item, str):
-        return {item: None}
-    if isinstance(item, dict):
-        return {name: table.parsed(value, "parameters", index, name) for name, value in item.items()}
-    table.fail(f"'parameters' contains {item!r}", "write a name, or { name = default }", "parameters", index)
-    return {}
+def _parameters(law: Table) -> tuple[dict[str, Expression | None], dict[str, str]]:
+    """Return the default of each parameter of a law, or None, and the declared units."""
+    defaults: dict[str, Expression | None] = {}
+    units: dict[str, str] = {}
+    declared: Any = law.data.get("parameters", {})
+    is_list = isinstance(declared, list)
+    for index, item in enumerate(declared if is_list else [law.mapping("parameters", "parameters")]):
+        where = ("parameters", index) if is_list else ("parameters",)
+        if isinstance(item, str):
+            defaults[item] = None
+        elif isinstance(item, dict):
+            for name, value in item.items():
+                entry = law.sub(value, f"{law.kind}, parameter {name}", "value", *where, name)
+                if entry is not None:
+                    entry.only("value", "unit")
+                    defaults[name], units[name] = entry.expression("value"), entry.text("unit")
+        else:
+            law.fail(f"'parameters' contains {item!r}", "write a name, or { name = default }", *where)
+    return defaults, units

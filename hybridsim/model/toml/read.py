@@ -110,7 +110,7 @@ def _model(text: str, path: str | None, files: PartFiles) -> Model:
         errors.extend(fault.errors)
     files.others.extend(root.source.files)
     if errors:
-        raise ModelError.collect(errors, root.source.file or f"model {name}")
+        raise ModelError.collect(errors, root.source.file or f"model {name}", root.source.file)
     return model
 
 

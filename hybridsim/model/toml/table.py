@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from hybridsim.errors import ExpressionError, ModelError, Place, nearest
+from hybridsim.errors import ExpressionError, ModelError, Place, near, nearest
 from hybridsim.expr import Expression, parse, parse_reset
 from hybridsim.model.toml.positions import Path
 
@@ -43,6 +43,7 @@ class Table:
         self.data = data
         self.kind = kind
         self.place = source.place(path)
+        self._misspelt: set[str] = set()  # known keys that unknown keys resemble
 
     def fail(self, message: str, remedy: str, *keys: str | int) -> None:
         """Report an error at this table or at one of its keys."""
@@ -53,6 +54,7 @@ class Table:
         """Report every key that is not among the known keys."""
         for key in self.data:
             if key not in known:
+                self._misspelt.update(near(key, known))
                 self.fail(f"unknown key '{key}'", nearest(key, known, kind="keys"), key)
 
     def only_in(self, *known: str, others: Sequence[str], remedy: str) -> None:
@@ -63,8 +65,8 @@ class Table:
         self.only(*known, *others)
 
     def require(self, key: str, remedy: str) -> bool:
-        """Return whether a key exists, and report it if it is missing."""
-        if key not in self.data:
+        """Return whether a key exists, and report it if it is missing and not misspelt."""
+        if key not in self.data and key not in self._misspelt:
             self.fail(f"'{key}' is missing", remedy)
         return key in self.data
 
@@ -130,7 +132,7 @@ class Table:
         if key not in self.data:
             if remedy is None:
                 return None
-            self.fail(f"'{key}' is missing", remedy)
+            self.require(key, remedy)
             return _ZERO
         return self.parsed(self.data[key], key)
 

@@ -101,21 +101,25 @@ def _state(state: State) -> dict[str, Any]:
 
 
 def _law(law: FrictionLaw) -> dict[str, Any]:
-    # TOML has no null, so parameters without a default need the list form
-    parameters: Any = law.parameters
-    if None in law.parameters.values():
-        parameters = [name if value is None else {name: value} for name, value in law.parameters.items()]
     fields = (
         "title", "source", "slip", "slip_backward", "stick", "stick_backward", "force", "definitions", "copies",
         "initial",
     )  # fmt: skip
     return {
-        "parameters": parameters,
+        "parameters": _parameters(law),
         **_fields(law, *fields),
         "states": {state.name: _state(state) for state in law.states},
-        "tables": {table.name: _table(table) for table in law.tables},
+        "tables": {table.name: {**_table(table), "unit": law.units.get(table.name)} for table in law.tables},
         "modes": {mode.name: _mode(mode) for mode in law.modes},
     }
+
+
+def _parameters(law: FrictionLaw) -> Any:
+    """Return the parameters of a law; a list if one has neither a default nor a unit, since TOML has no null."""
+    declared = {name: {"value": value, "unit": law.units.get(name)} for name, value in law.parameters.items()}
+    entries = _short("value", declared)
+    bare = {name for name, entry in declared.items() if not any(map(_is_set, entry.values()))}
+    return [name if name in bare else {name: entries[name]} for name in declared] if bare else entries
 
 
 def _table(table: LawTable) -> dict[str, Any]:

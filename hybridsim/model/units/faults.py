@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
+import ast
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from hybridsim.expr import parse
 from hybridsim.expr.grammar import TIME
-from hybridsim.expr.write import write
 from hybridsim.model.checks.caution import Caution
 from hybridsim.model.parts.model import Model
 from hybridsim.model.units.infer import Disagreement
-from hybridsim.model.units.parse import write_unit
+from hybridsim.model.units.parse import read_unit, write_unit
 from hybridsim.model.units.quantities import Quantities
 from hybridsim.model.units.seconds import SECOND
 from hybridsim.model.units.statements import Statement, statements_of
 from hybridsim.model.units.unit import Unit
 from hybridsim.model.units.votes import quantities_of
 
+_NUMBER = parse(0)
 HEADER = ("what", "unit", "how it is known")
 DECLARED, INFERRED, UNKNOWN, AGREES, DISAGREES = "declared", "inferred", "unknown", "agrees", "disagrees"
 
@@ -26,12 +28,13 @@ _COPY = re.compile(r"(?<=\w)\d+(?=\.[A-Za-z_])")  # the number of a copy in a na
 
 @dataclass(frozen=True)
 class UnitOfExpression:
-    """The unit of one expression, with the reasons if it is unknown, and the disagreements in it."""
+    """The unit of one expression, the reasons if it is unknown, and warnings that no other expression has."""
 
     statement: Statement
     unit: Unit | None
     unknown: tuple[str, ...]
     cautions: tuple[Caution, ...]
+    agrees: bool
 
 
 def unit_faults(model: Model) -> Iterator[Caution]:
@@ -57,31 +60,52 @@ def _times_of_inputs(model: Model, known: Quantities) -> Iterator[Caution]:
 def units_of_expressions(model: Model, known: Quantities) -> Iterator[UnitOfExpression]:
     """Yield the unit of each expression of a model.
 
-    A warning is given once for each line, and for the first copy of a repeated part. In the expressions of a friction
-    law it is left out if an argument of the law or another expression of the law has it.
+    A warning is given once for each line, and for the first copy of a repeated part. A warning that follows from a
+    value that a contact passes to its friction law is given for the first expression of the law.
     """
     reported: set[tuple[str, str]] = set()
     for statement in statements_of(model, known):
-        inference = known.inference(statement.counts)
-        unit = inference.unit(statement.expr.tree)
+        law, tree = statement.law, statement.tree
+        inference = known.inference(statement.counts) if law is None else law.inference()
+        unit = inference.unit(tree)
         found = list(inference.disagreements)
         if unit is not None and statement.required is not None and unit.differs(statement.required):
-            found.append(Disagreement(statement.expr.tree, unit, statement.required, statement.because))
+            found.append(Disagreement(tree, unit, statement.required, statement.because))
         cautions = []
-        for caution in (_caution(statement, one, known) for one in found):
-            text = _COPY.sub("", caution.message.partition(": ")[2])
-            where = "" if statement.is_of_law else _line_of(caution) or statement.what
+        for one in found:
+            passed = [] if law is None else law.passed_values(_terms(one))
+            caution = _caution(statement, one, known, passed)
+            text = (
+                _COPY.sub("", caution.message.partition(": ")[2]) if law is None else statement.text(one.term)
+            )
+            is_passed = law is not None and (law.is_packaged or bool(passed))
+            where = "" if is_passed else _line_of(caution) or statement.what
             if (where, text) not in reported:
                 cautions.append(caution)
             reported |= {(where, text), ("", text)}
-        yield UnitOfExpression(statement, unit, tuple(inference.unknown), tuple(cautions))
+        yield UnitOfExpression(statement, unit, tuple(inference.unknown), tuple(cautions), not found)
 
 
-def _caution(statement: Statement, found: Disagreement, known: Quantities) -> Caution:
+def _terms(found: Disagreement) -> Iterator[ast.expr]:
+    yield found.term
+    if isinstance(found.because, ast.expr):
+        yield found.because
+
+
+def _caution(statement: Statement, found: Disagreement, known: Quantities, passed: Sequence[str]) -> Caution:
+    """Return the warning about a disagreement; `passed` lists values of a contact that it depends on."""
     own, required = (write_unit(unit, known.labels) for unit in (found.unit, found.required))
-    message = f"{statement.what}: '{write(found.term)}' {_is_in(own)}, but {found.because} {_is_in(required)}"
-    node = None if statement.is_of_law else found.term
+    because = found.because if isinstance(found.because, str) else f"'{statement.text(found.because)}'"
+    message = (
+        f"{statement.what}: '{statement.text(found.term)}' {_is_in(own)}, but {because} {_is_in(required)}"
+    )
+    if statement.law is None:
+        place = statement.expr.error(message, node=found.term).place
+    else:
+        place = statement.law.place(statement.expr, found.term, found.required)
     remedy = "correct the expression or a unit; a constant with a unit is declared in [parameters]"
+    if passed:
+        remedy = f"correct the expression, a unit, or a value that the contact passes: {', '.join(passed)}"
     if found.unit.differs(found.required) != "dimension":
         ratio = "/".join(f"({text})" if "/" in text or " " in text else text for text in (required, own))
         factor = found.unit.factor(found.required)
@@ -89,7 +113,7 @@ def _caution(statement: Statement, found: Disagreement, known: Quantities) -> Ca
             "units are not converted: use one unit, or multiply by a parameter that converts, "
             f'{{ value = {factor:.9g}, unit = "{ratio}" }}'
         )
-    return Caution(message, statement.expr.error(message, node=node).place, remedy)
+    return Caution(message, place, remedy)
 
 
 def _line_of(caution: Caution) -> str:
@@ -115,11 +139,11 @@ def unit_rows(model: Model) -> Iterator[tuple[str, str, str]]:
         what, expr = expression.statement.what, expression.statement.expr
         if expr.is_constant:
             continue
-        if expression.unit is None and not expression.cautions:
+        if expression.unit is None and expression.agrees:
             yield what, "", f"{UNKNOWN}: {'; '.join(dict.fromkeys(expression.unknown))}"
         else:
             unit = "" if expression.unit is None else write_unit(expression.unit, known.labels)
-            yield what, unit, DISAGREES if expression.cautions else AGREES
+            yield what, unit, AGREES if expression.agrees else DISAGREES
 
 
 def _quantities(model: Model, known: Quantities) -> Iterator[tuple[str, str, str]]:
@@ -134,3 +158,8 @@ def _quantities(model: Model, known: Quantities) -> Iterator[tuple[str, str, str
             yield name, text, DECLARED
         else:
             yield name, write_unit(known.units[name], known.labels), INFERRED
+    for contact in model.contacts:
+        for name, text in contact.law.units.items():
+            if contact.arguments.get(name, _NUMBER).is_constant and name in contact.law.parameters:
+                known_text = DECLARED if read_unit(text) else f"{UNKNOWN}: this text is not a known unit"
+                yield f"contact {contact.name}, law {contact.law.name}, {name}", text, known_text

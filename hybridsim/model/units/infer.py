@@ -34,7 +34,7 @@ class Disagreement:
     term: ast.expr
     unit: Unit
     required: Unit
-    because: str  # the other term as it is written, or the place that needs a unit
+    because: ast.expr | str  # the other term, or the place that needs a unit
 
 
 class Inference:
@@ -98,7 +98,7 @@ class Inference:
         usual = next(node for node, unit in known if unit == common)
         for node, unit in known:
             if unit.differs(common):
-                self.disagreements.append(Disagreement(node, unit, common, f"'{write(usual)}'"))
+                self.disagreements.append(Disagreement(node, unit, common, usual))
         return common
 
     def _product(self, node: ast.expr) -> Unit | None:
@@ -112,23 +112,23 @@ class Inference:
         numbers = [factor for factor, _ in factors if is_number(factor)]
         if all(_is_one(number) for number in numbers):
             return product
-        if not (self.counts or (self._has_parameter(node) and all(map(_is_pure, numbers)))):
+        if not (self.counts or (self.has_parameter(node) and all(map(_is_pure, numbers)))):
             self.unknown.append(f"a number in '{write(node)}' may have a unit")
             return None
         turns = any(isinstance(part, ast.Name) for number in numbers for part in ast.walk(number))
         return product.without_angles() if turns else product  # 2*pi*f is in rad/s
 
-    def _has_parameter(self, node: ast.expr) -> bool:
+    def has_parameter(self, node: ast.expr) -> bool:
         """Return whether a product contains a parameter, or a power of a parameter, with a known unit other than 1."""
         match node:
             case ast.Name(id=name):
                 return name in self.parameters and self.units.get(name, ONE) != ONE
             case ast.UnaryOp(operand=operand):
-                return self._has_parameter(operand)
+                return self.has_parameter(operand)
             case ast.BinOp(left=base, op=ast.Pow()) | ast.Call(func=ast.Name(id="sqrt" | "abs"), args=[base]):
-                return self._has_parameter(base)
+                return self.has_parameter(base)
             case ast.BinOp(left=left, op=ast.Mult() | ast.Div(), right=right):
-                return self._has_parameter(left) or self._has_parameter(right)
+                return self.has_parameter(left) or self.has_parameter(right)
         return False
 
     def _power(self, base: ast.expr, exponent: ast.expr) -> Unit | None:

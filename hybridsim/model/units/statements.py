@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import ast
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
 from hybridsim.expr import Expression
 from hybridsim.expr.grammar import TIME
+from hybridsim.expr.write import write
 from hybridsim.model.laws.law_with_states import ContactState
 from hybridsim.model.parts.component import Component
 from hybridsim.model.parts.contact import Contact
 from hybridsim.model.parts.inputs import Input
 from hybridsim.model.parts.model import Model
+from hybridsim.model.units.law_names import LawNames
 from hybridsim.model.units.parse import read_unit
 from hybridsim.model.units.quantities import Quantities
 from hybridsim.model.units.seconds import SECOND
@@ -31,8 +34,17 @@ class Statement:
     expr: Expression
     required: Unit | None = None
     because: str = ""
-    is_of_law: bool = False  # whether it is an expression of a friction law, in which arguments are inserted
     counts: bool = False  # whether numbers in products are pure numbers, as in a duration of 20 periods
+    law: LawNames | None = None  # the names of the friction law to which the expression belongs
+
+    @property
+    def tree(self) -> ast.expr:
+        """The tree of the expression, in which the names of a law that are only numbers are inserted."""
+        return self.law.tree(self.expr) if self.law else self.expr.tree
+
+    def text(self, node: ast.expr) -> str:
+        """Return the text of a part of the expression."""
+        return self.law.text(node, self.expr) if self.law else write(node)
 
 
 def statements_of(model: Model, known: Quantities) -> Iterator[Statement]:
@@ -53,7 +65,7 @@ def statements_of(model: Model, known: Quantities) -> Iterator[Statement]:
     for signal in model.inputs:
         yield from _of_input(known, signal)
     for contact in model.contacts:
-        yield from _of_contact(known, contact, model)
+        yield from _of_contact(known, contact)
     for surface in model.surfaces:
         yield Statement(f"surface {surface.name}", surface.expr)
         for side, values in (("above", surface.above), ("below", surface.below)):
@@ -109,63 +121,25 @@ def _of_input(known: Quantities, signal: Input) -> Iterator[Statement]:
     required: dict[str, tuple[Unit | None, str]] = {
         "period": (time, TIME), "duration": (time, TIME), "duty": (ONE, "a share"),
         "f0": (frequency, "a frequency"), "f1": (frequency, "a frequency"),
-        "phase": (time, TIME) if signal.kind == "wave" else (ONE, "an angle"),
+        "phase": (ONE, "an angle") if signal.kind == "chirp" else (time, TIME),
     }  # fmt: skip
     for field, expr in signal.expressions.items():
         unit, because = required.get(field, (known.units.get(signal.name), signal.name))
         yield Statement(f"input {signal.name}, {field}", expr, unit, because)
 
 
-def _of_contact(known: Quantities, contact: Contact, model: Model) -> Iterator[Statement]:
+def _of_contact(known: Quantities, contact: Contact) -> Iterator[Statement]:
     what = f"contact {contact.name}"
     speed = _unless(known, contact.velocity, _SPEEDS)
     yield Statement(f"{what}, velocity", contact.velocity, speed, "a relative velocity")
     yield Statement(f"{what}, normal", contact.normal)
     what += f", law {contact.law.name}"
+    law = LawNames(known, contact)
     for name, expr in contact.arguments.items():
-        yield Statement(f"{what}, {name}", expr)
-    positions = (argument.place for argument in contact.arguments.values())
-    place = next(positions, None) or contact.place
-    load = known.inference().unit(contact.normal.tree)
-    for part, expr, required, because in _of_law(known, contact, model):
-        at = contact.normal.place if _is_of_load(known, expr, load, required) else place
-        there = Expression(expr.text, expr.names, at, expr.tree)
-        yield Statement(f"{what}, {part}", there, required, because, is_of_law=True)
-
-
-def _is_of_load(known: Quantities, expr: Expression, load: Unit | None, required: Unit | None) -> bool:
-    """Return whether a force is a pure number times a load whose unit differs from the unit of the force."""
-    if load is None or required is None or not load.differs(required):
-        return False
-    unit = known.inference().unit(expr.tree)
-    return unit is not None and not unit.differs(load)
-
-
-def _of_law(
-    known: Quantities, contact: Contact, model: Model
-) -> Iterator[tuple[str, Expression, Unit | None, str]]:
-    """Yield the names and expressions of the forces and states of a law, each with the required unit."""
-    law, name, force = contact.law, contact.name, known.units.get(contact.name)
-    if law.is_set_valued:
-        for backward in (False, True) if law.slip_backward or law.stick_backward else (False,):
-            suffix = " backward" if backward else ""
-            yield f"slip{suffix}", contact.slip_force(contact.velocity, backward=backward), force, name
-            yield f"stick{suffix}", contact.limit_force(backward), force, name
-        return
-    for component in model.components_of(contact):
-        for mode in component.modes:
-            for name, expr in mode.set.items():
-                yield f"{name} in {mode.name}", expr, known.units.get(name), name
-            for name, expr in mode.der.items():
-                yield f"rate of {name} in {mode.name}", expr, known.rate(name), f"the rate of {name}"
-            for guard in mode.guards:
-                yield f"guard {guard.name} of {mode.name}", guard.expr, None, ""
-                for name, expr in (pair for choice in guard.then for pair in choice.reset.items()):
-                    yield f"reset of {name} in {mode.name}", expr, known.units.get(name), name
-    own = tuple(contact.variable(state.name) for state in law.states)
-    for state in model.states:
-        if isinstance(state, ContactState) and state.name.startswith(own):
-            yield f"rate of {state.name}", state.der, known.rate(state.name), f"the rate of {state.name}"
+        declared = read_unit(contact.law.units.get(name, ""))
+        yield Statement(f"{what}, {name}", expr, declared, f"{name} of the law")
+    for part, expr, required, because in law.formulas():
+        yield Statement(f"{what}, {part}", expr, required, because, law=law)
 
 
 def _of_component(known: Quantities, component: Component) -> Iterator[Statement]:

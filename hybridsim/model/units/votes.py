@@ -12,9 +12,12 @@ from dataclasses import dataclass
 
 from hybridsim.expr import Expression
 from hybridsim.model.laws.law_with_states import ContactState
+from hybridsim.model.parts.contact import Contact
 from hybridsim.model.parts.model import Model
+from hybridsim.model.parts.quantities import State
 from hybridsim.model.smoothing.one_sided import names_of
 from hybridsim.model.units.infer import factors_of, terms_of
+from hybridsim.model.units.law_names import LawNames
 from hybridsim.model.units.parse import read_unit
 from hybridsim.model.units.quantities import Quantities, declared_quantities
 from hybridsim.model.units.unit import ONE, Unit, most_frequent
@@ -74,7 +77,8 @@ class _Witnesses:
 
     def __init__(self, model: Model, known: Quantities) -> None:
         self.known = known
-        self.rates = {state.name: state.der for state in model.states if isinstance(state, ContactState)}
+        self.contacts = {contact.name: contact for contact in model.contacts}
+        self.rates = {state.name: of for state in model.states for of in _of_law(model, state)}
         self.setting = _setting(model)
         signals = (*(part.name for part in model.discrete), *(signal.name for signal in model.inputs))
         numbers = {name for name, expr in model.definitions if expr.is_constant}
@@ -84,7 +88,7 @@ class _Witnesses:
         for use in _uses(model):
             for name in use.expr.names & single:
                 self.uses[name].append(use)
-        self.names = [*dict.fromkeys((*self.setting, *self.rates, *model.variables()))]
+        self.names = [*dict.fromkeys((*self.setting, *self.rates, *self.contacts, *model.variables()))]
 
     def unit(self, name: str) -> Unit | None:
         """Return the unit of a name that follows from most expressions, or the first of several such units."""
@@ -99,10 +103,27 @@ class _Witnesses:
         for expr in self.setting.get(name, ()):
             units = (known.inference().unit(term) for term in terms_of(expr.tree))
             yield from (unit for unit in units if unit is not None)
+        if name in self.contacts:
+            law = LawNames(known, self.contacts[name])
+            for _, expr in law.forces():
+                terms = map(law.unit, terms_of(law.tree(expr)))
+                yield from (unit for unit in terms if unit is not None)
         if name in self.rates and known.time is not None:
-            rate = known.inference().unit(self.rates[name].tree)
+            contact, der = self.rates[name]
+            law = LawNames(known, contact)
+            rate = law.unit(law.tree(der))
             if rate is not None:
                 yield rate * known.time
+
+
+def _of_law(model: Model, state: State) -> Iterator[tuple[Contact, Expression]]:
+    """Yield the contact whose law adds a state, and the rate of the state in the names of the law."""
+    if isinstance(state, ContactState):
+        for contact in model.contacts:
+            for own in contact.law.states:
+                name = contact.variable(own.name)
+                if state.name == name or (contact.law.copies and state.name.rstrip("0123456789") == name):
+                    yield contact, own.der
 
 
 def _setting(model: Model) -> dict[str, list[Expression]]:
@@ -113,10 +134,7 @@ def _setting(model: Model) -> dict[str, list[Expression]]:
         found[signal.name] = [e for e in (signal.amplitude, signal.offset) if e is not None]
     found |= {discrete.name: [discrete.start] for discrete in model.discrete}
     found |= {state.name: [state.start] for state in model.states}
-    contacts = {contact.name for contact in model.contacts if contact.law.is_set_valued}
-    for contact in model.contacts:
-        if contact.law.is_set_valued:
-            found[contact.name] = [contact.slip_force(contact.velocity)]
+    contacts = {contact.name for contact in model.contacts}
     for component in model.all_components():
         for mode in component.modes:
             for name, expr in mode.set.items():

@@ -17,9 +17,11 @@ from hybridsim.engine.system.instant import Instant
 from hybridsim.engine.system.period import forcing_period
 from hybridsim.errors import UsageError, nearest
 from hybridsim.mechanics.declaration.system import Harmonic, MechanicalSystem
+from hybridsim.model.checks.units import unit_of as unit_of_expression
 from hybridsim.model.checks.units import units_of
 from hybridsim.plot.shared.curve_samples import sample_curves
 from hybridsim.solution import Solution
+from hybridsim.solution.run_trajectory import relative_velocity
 
 # First division of a whole picture, two parts per horizontal pixel, before parts on which a curve bends are divided.
 # Between events there are at least 2 parts, and at least 4 if the picture then has no more than 60 000 points.
@@ -186,7 +188,11 @@ def unit_of(solution: Solution, name: str) -> str:
                 f"{solution.model.name} has no quantity '{name}'",
                 remedy=nearest(name, units, kind="quantities"),
             ) from None
-    return units.get(name, "")
+        model = solution.model
+        expressions = {relative_velocity(contact.name): contact.velocity for contact in model.contacts}
+        expressions |= dict(getattr(model, "definitions", ()))
+        return unit_of_expression(model, expressions[name]) if name in expressions else ""
+    return units[name]
 
 
 def extent(values: NDArray[np.float64]) -> tuple[float, float]:

@@ -35,7 +35,8 @@ class Signal:
             name: self.number(evaluate(expr, values)) for name, expr in declared.expressions.items()
         }
         if declared.kind == "table":
-            self._times = [self.number(knot) for knot in declared.times]
+            delay = self.values.get("phase", self.number(0))
+            self._times = [self.number(knot) + delay for knot in declared.times]
             self._table = _cubics(declared, self._times, self.number)
 
     @property

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import exp, inf, log
+from pathlib import Path
 
 import pytest
 
@@ -181,7 +182,9 @@ def test_a_failed_run_and_a_passage_that_never_comes_have_no_bar() -> None:
         (["coulomb"], {"contact": "g"}, "model block has no contact 'g'"),
         (["coulomb"], {"quantity": "y"}, "model block has no quantity 'y'"),
         (["coulomb"], {"rtl": 1}, "'rtl' is not an option"),
-        (["coulomb"], {"t_span": (0, 1), "keep": "events"}, "has no option `keep`"),
+        (["coulomb"], {"t_span": (0, 1), "keep": "events"}, "`keep` cannot be 'events'"),
+        (["coulomb"], {"t_span": (0, 1), "keep": "last-period"}, "`keep` cannot be 'last-period'"),
+        (["coulomb"], {"t_span": (0, 1), "save": "all"}, "has no option `save`"),
         (["coulomb"], {"measure": 3}, "`measure` cannot be 3"),
         (["coulomb"], {"measure": []}, r"`measure` cannot be \[\]"),
         (["coulomb"], {"t_span": (0, 1), "measure": "maximum.y"}, "no measure 'maximum.y' of a run"),
@@ -232,3 +235,69 @@ def test_a_definition_is_not_a_measured_quantity() -> None:
         hs.compare_laws(defined, ["coulomb"], (0, 1), measure="final.power")
     with pytest.raises(hs.UsageError, match=remedy):
         hs.sweep(defined, {"m": [1.0, 2.0]}, "amplitude.power")
+
+
+def test_the_whole_run_of_a_forced_model() -> None:
+    """From rest at x = 1 under -x - f + 0*sin(2*t), mu*N = 0.1: the turns are at -0.8, 0.6, -0.4, 0.2 and 0.
+
+    The run ends in the last of these stops. In the last period of 3 nothing moves.
+    """
+    states = [hs.State("x", 1, "v", nominal=1), hs.State("v", 0, "-x - f + tiny*sin(2*t)", nominal=1)]
+    contact = hs.Contact("f", "v", "1", "coulomb", {"mu": 0.1})
+    model = hs.Model("swing", states, {"tiny": 0.0}, contacts=[contact], duration=20)
+    forced = hs.Model("swing", states, {"tiny": 1e-9}, contacts=[contact], duration=20)
+    (last,) = hs.compare_laws(forced, ["coulomb"]).rows
+    assert last.is_period and last.amplitude_of_quantity == pytest.approx(0.0, abs=1e-8)
+    found = hs.compare_laws(forced, ["coulomb"], keep="all", measure=None)
+    (whole,) = found.rows
+    assert found.t_span == (0, 20) and not whole.is_period and whole.residual is None
+    assert whole.amplitude_of_quantity == pytest.approx((1 + 0.8) / 2, abs=1e-8)
+    assert whole.energy_loss == pytest.approx(0.1 * (1.8 + 1.4 + 1.0 + 0.6 + 0.2), abs=1e-8)
+    (free,) = hs.compare_laws(model, ["coulomb"], keep="all").rows
+    assert whole.stops == free.stops == 1
+    loops, _ = found.plot()
+    assert (loops.lines[0].get_xdata().min(), loops.lines[0].get_xdata().max()) == pytest.approx((-0.8, 1.0))
+    (row,) = hs.compare_laws(forced, ["coulomb"], (0, 20), keep="all", measure="final.x").rows
+    assert row.measured["final.x"] == pytest.approx(0.0, abs=1e-8)
+
+
+def test_all_periods_of_a_long_run_are_drawn() -> None:
+    """Of 40 periods the first one has the largest motion."""
+    states = [hs.State("x", 5, "v", nominal=1), hs.State("v", 0, "-x - 0.5*v - f + sin(t)", nominal=1)]
+    contact = hs.Contact("f", "v", "1", "coulomb", {"mu": 0.1})
+    model = hs.Model("long", states, contacts=[contact])
+    loops, _ = hs.compare_laws(model, ["coulomb"], (0, 250), keep="all").plot()
+    assert loops.lines[0].get_xdata().max() == pytest.approx(5.0)
+
+
+def test_laws_of_one_name_have_labels_of_their_own(tmp_path: Path) -> None:
+    text = '[laws.pad]\nparameters.mu = 0.3\nslip = "mu*N"\nstick = "{stick}*mu*N"\n'
+    for name, stick in (("dry", 1), ("wet", 1.1)):
+        (tmp_path / f"{name}.toml").write_text(text.format(stick=stick), encoding="utf-8")
+    dry, wet = str(tmp_path / "dry.toml"), tmp_path / "wet.toml"
+    found = hs.compare_laws(block(), [dry, wet, (wet, {"mu": 0.2}), "coulomb"], (0, 4))
+    assert found.labels == (f"pad ({dry})", f"pad ({wet})", f"pad ({wet}, mu=0.2)", "coulomb")
+    own = [hs.FrictionLaw("own", slip=f"{mu}*N", stick=f"{mu}*N") for mu in (0.1, 0.2)]
+    found = hs.compare_laws(block(), [*own, ("coulomb", {"mu": 0.1}), ("coulomb", {"mu": 0.2})], (0, 4))
+    assert found.labels == ("own #1", "own #2", "coulomb (mu=0.1)", "coulomb (mu=0.2)")
+    _, bars = found.plot()
+    assert tuple(label.get_text() for label in bars.get_yticklabels()) == found.labels
+
+
+def test_the_axis_of_the_loops_is_chosen_and_has_its_unit() -> None:
+    model = block().to_toml()
+    for old, new in (
+        ("nominal = 1.0", 'nominal = 1.0\nunit = "m"'),
+        ("start = 2.0", 'start = 2.0\nunit = "m/s"'),
+    ):
+        assert old in model
+        model = model.replace(old, new, 1)
+    found = hs.compare_laws(hs.Model.from_toml(model), ["coulomb", THICK], (0, 4))
+    loops, bars = found.plot()
+    assert loops.get_xlabel() == "x [mm]" and bars.get_xlabel() == "amplitude of x [mm]"
+    for name in ("v", "v_rel(f)"):
+        loops, bars = found.plot(name)
+        assert "[m/s]" in loops.get_xlabel() and bars.get_xlabel() == "amplitude of x [mm]"
+        assert [max(line.get_xdata()) for line in loops.lines] == pytest.approx([V, V])
+    with pytest.raises(hs.UsageError, match="has no quantity 'w'"):
+        found.plot("w")

@@ -93,10 +93,10 @@ def test_shared_unknowns_and_fixed_parameters() -> None:
 
 
 def test_one_law_with_several_fixed_parameters() -> None:
-    """The data have no viscous part, so that c = 0 is better than c = 1/2; the second label contains c."""
+    """The data have no viscous part, so that c = 0 is better than c = 1/2; both labels contain c."""
     laws = [("viscous", {"mu": (0.1, 2.0), "c": 0.5}), ("viscous", {"mu": (0.1, 2.0), "c": 0.0})]
     found = hs.fit_laws(slider("coulomb", mu=0.3), measured(sigma=0.01), laws)
-    assert found.labels == ("viscous (c=0.0)", "viscous")
+    assert found.labels == ("viscous (c=0.0)", "viscous (c=0.5)")
     assert found.rows[0].fit.values["f_mu"] == pytest.approx(0.6, abs=0.01)
 
 

@@ -91,7 +91,7 @@ def test_one_file_for_all_ways_to_a_law(folder: Path) -> None:
         ("pads/pad.toml", "scale*mu*N", "scale*mu*(", "pads/pad.toml:5", "invalid expression"),
         ("pads/pad.toml", "stick", "stack", "pads/pad.toml:6", "unknown key 'stack'"),
         ("pads/pad.toml", "[laws.pad]", "[laws.pad", "pads/pad.toml:3", "invalid TOML"),
-        ("pads/pad.toml", "look", "states", "pads/pad.toml:2", "unknown key 'states'"),
+        ("pads/pad.toml", "look", "state", "pads/pad.toml:2", "unknown key 'state'"),
         ("pads/pad.toml", "[laws.pad]", "[laws.a]\nforce = 'v'\n[laws.b]", "pads/pad.toml", "declares 2 laws: a, b"),
         ("pads/pad.toml", "mu.csv", "nu.csv", "pads/pad.toml:7", "the file pads/nu.csv does not exist"),
         ("pads/pad.toml", '"v", "mu"', '"v", "m"', "pads/pad.toml:7", "mu.csv:1: column 'm' does not exist"),
@@ -114,3 +114,57 @@ def test_errors_name_the_file_and_the_line(
         hs.load("block.toml")
     places = [str(error).partition(": ")[0] for error in caught.value.errors]
     assert place in places and message in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("changes", "first", "remedy", "count"),
+    [
+        # the misspelt name is told, and not that the parameter which it means is unused
+        ({"mu*N*exp(-v/v_s)": "mu*N*exp(-v/vz)"}, "pad.toml:3: law pad, slip: unknown name 'vz'", "'v_s'?", 1),
+        # the misspelt key is told, and not that the key which it means is missing
+        ({"stick": "stuck"}, "pad.toml:4: law pad: unknown key 'stuck'", "did you mean 'stick'?", 1),
+        ({"v_s = 0.1": "v_s = 0.1, v_d = 1"}, "car.toml:7: contact f: the law 'pad' has no parameter", "'v_s'?", 1),
+        # the line above the keys
+        ({"[laws.pad]\n": ""}, "pad.toml:1: the file of a law: unknown 'parameters', ", "write the line [laws", 1),
+        # one list has to be mended, and both errors tell it
+        (
+            {'["mu", "v_s"]': '["mue", "v_s"]'},
+            "pad.toml:3: law pad, slip: unknown name 'mu'",
+            "add 'mu' to the `parameters` of the law",
+            3,
+        ),
+        ({'"mu*N"': '"mu*N*v"'}, "pad.toml:4: law pad, stick: 'v' cannot be used here", "allowed here: N, mu, v_s", 1),
+        # the law file comes first, because its errors may cause those of the model
+        (
+            {"-v/v_s": "-w/v_s", '"-f"': '"-f - k"'},
+            "pad.toml:3: law pad, slip: unknown name 'w'",
+            "to pass another quantity, add 'w' to the `parameters` of the law",
+            2,
+        ),
+        ({"mu = 0.3, v_s = 0.1": "mu = 0.3"}, "car.toml:4: contact f: the law 'pad' needs a value for", "add v_s", 1),
+    ],
+)  # fmt: skip
+def test_the_first_error_is_the_one_to_mend(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    changes: dict[str, str],
+    first: str,
+    remedy: str,
+    count: int,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    files = {
+        "car.toml": '[states]\nx = { start = 0, der = "v" }\nv = { start = 1, der = "-f" }\n[contacts.f]\n'
+        'velocity = "v"\nnormal = 10\nlaw = { file = "pad.toml", mu = 0.3, v_s = 0.1 }\n',
+        "pad.toml": '[laws.pad]\nparameters = ["mu", "v_s"]\nslip = "mu*N*exp(-v/v_s)"\nstick = "mu*N"\n',
+    }
+    assert all(any(old in text for text in files.values()) for old in changes)
+    for name, text in files.items():
+        for old, new in changes.items():
+            text = text.replace(old, new)
+        Path(name).write_text(text, encoding="utf-8")
+    with pytest.raises(hs.ModelError) as caught:
+        hs.load("car.toml")
+    assert str(caught.value.errors[0]).startswith(first)
+    assert remedy in str(caught.value.errors[0].remedy)
+    assert len(caught.value.errors) == count

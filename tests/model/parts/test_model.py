@@ -183,8 +183,9 @@ def test_an_argument_of_a_law_is_no_parameter_and_how_it_becomes_one(argument: s
     states = [hs.State("x", 1, "v"), hs.State("v", 0, "-x - f")]
     contact = hs.Contact("f", "v", "1", "coulomb", {"mu": argument})
     model = hs.Model("m", states, {"friction": 0.3}, contacts=[contact])
+    with pytest.raises(UsageError, match=words if argument == "friction" else "value 0.3; write f.mu"):
+        model.with_(mu=0.4)
     for ask in (
-        lambda: model.with_(mu=0.4),
         lambda: hs.sweep(model, {"mu": [0.3, 0.4]}, "final", t_span=(0, 1)),
         lambda: hs.continuation(model, "mu", (0.2, 0.4)),
     ):

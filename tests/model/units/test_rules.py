@@ -162,7 +162,7 @@ PLACES = {
     ),
     "force of a law": (
         '[contacts.f]\nvelocity = "v"\nnormal = "F"\nlaw = { name = "dahl", mu = "ratio", sigma = "c" }\n',
-        "contact f, law dahl, rate of f_z: 'c/(ratio*F)*abs(v)*f_z' is in m, but 'v' is in m/s", 2,
+        "contact f, law dahl, rate of z: 'c/(ratio*F)*abs(v)*f_z' is in m, but 'v' is in m/s", 2,
     ),
     "surface": ('[surfaces]\nu = "x + v"\n', "surface u: 'v' is in m/s, but 'x' is in m", 0),
     "above": (

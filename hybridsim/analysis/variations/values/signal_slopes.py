@@ -51,6 +51,8 @@ class SignalSlopes:
             found[4] = self._wave_knot(origin + slots[4])
         elif kind == "chirp":
             found[:4] = self._chirp(origin, bool(slots[2]))
+        elif kind == "table" and "phase" in d:
+            found[4] = d["phase"]
         return found
 
     def knot(self, t: Instant) -> np.ndarray:
@@ -60,6 +62,8 @@ class SignalSlopes:
             return d["duration"]
         if self.declared.kind == "wave" and self.declared.shape != "sine":
             return self._wave_knot(time)
+        if self.declared.kind == "table" and "phase" in d:
+            return d["phase"]
         if self.declared.kind == "step":
             by = d["shift"] + (time * d["rate"] if "amplitude" not in v else 0.0)
             rate = v["rate"]

@@ -7,6 +7,7 @@ the piece of the table that has this value 1 and all others 0.
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -48,9 +49,9 @@ def table_value(model: Model, name: str) -> TableValue | None:
 class TableSlopes:
     """Derivatives of a table with respect to one of its values."""
 
-    def __init__(self, declared: Input, index: int) -> None:
+    def __init__(self, declared: Input, index: int, parameters: Mapping[str, float]) -> None:
         values = tuple(float(k == index) for k in range(len(declared.values)))
-        self.value, self._unit = declared.values[index], Signal(replace(declared, values=values), {})
+        self.value, self._unit = declared.values[index], Signal(replace(declared, values=values), parameters)
 
     def coefficients(self, origin: float) -> np.ndarray:
         """Return the derivatives (5,) of the coefficients that describe a table just after an instant."""

@@ -38,7 +38,9 @@ class VectorSlopes:
         self.rates = values_and_slopes(out, P)[1]  # of the forcing's angular rates
         self._signals = self._of_signals()
         inputs = system.model.inputs
-        self._tables = [(one.number, TableSlopes(inputs[one.number], one.value)) for one in tables]
+        self._tables = [
+            (one.number, TableSlopes(inputs[one.number], one.value, system.values)) for one in tables
+        ]
         n, d = system.n, layout.discrete
         self._fixed = np.zeros(
             (n + 1 + layout.size, n + 1 + d + P + len(tables))
