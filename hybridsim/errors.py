@@ -168,7 +168,7 @@ class ModelError(HybridsimError):
         # errors with equal texts are reported once
         every = {str(single): single for error in errors for single in error.errors}
         files = list(dict.fromkeys(_file(single) for single in every.values()))
-        order = {file: (file == own, k) for k, file in enumerate(files)}
+        order = {file: (file is not None, file == own, k) for k, file in enumerate(files)}
         found = sorted(every.values(), key=lambda single: (order[_file(single)], _line(single)))
         if len(found) == 1:
             return found[0]
