@@ -184,7 +184,10 @@ class ModelTrajectory(ModelEvents):
             found |= {name: rows[:, k] for name, k in self._velocities.items() if name in names}
         for name, contact in self._velocities_without_stick.items():
             if name in names:
-                found[name] = velocity_of(contact, self, segment, s, x)
+                read = [n for n in contact.velocity.names if n in self.names or n in self.quantities]
+                values = dict(zip(read, self.values_at(read, segment, s, x), strict=True))
+                times = segment.p[system.layout.origin_at] + s
+                found[name] = velocity_of(contact, values, times, self.model.parameter_values())
         others = [name for name in names if name not in found]
         found |= dict(zip(others, self.values_in(others, segment, s, x), strict=True))
         return [found[name] for name in names]

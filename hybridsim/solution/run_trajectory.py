@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
-from typing import TYPE_CHECKING, Any, Protocol
+from collections.abc import Collection, Mapping, Sequence
+from typing import Any, Protocol
 
 import numpy as np
 
-from hybridsim.engine.record.segments import Segment
 from hybridsim.expr import evaluate
 from hybridsim.expr.grammar import TIME
 from hybridsim.model import Contact, Model
 from hybridsim.presentation.tables import Table
 from hybridsim.solution.event import Event, ModeInterval
-from hybridsim.solution.files.tabulated import SegmentConstants
-
-if TYPE_CHECKING:
-    from hybridsim.solution.model_trajectory import ModelTrajectory
 
 
 def relative_velocity(contact: str) -> str:
@@ -102,16 +97,10 @@ def contacts_without_stick(model: Model, with_stick: Collection[str]) -> dict[st
 
 
 def velocity_of(
-    contact: Contact,
-    trajectory: ModelTrajectory,
-    segment: Segment | SegmentConstants,
-    s: np.ndarray,
-    x: np.ndarray,
+    contact: Contact, values: Mapping[str, np.ndarray], times: np.ndarray, parameters: Mapping[str, float]
 ) -> np.ndarray:
-    """Return the relative velocity (k,) of a contact at local times (k,) and states (k, n) of a segment."""
-    names = [n for n in contact.velocity.names if n in trajectory.names or n in trajectory.quantities]
-    times = segment.p[trajectory.system.layout.origin_at] + s
-    columns = [*trajectory.values_at(names, segment, s, x), times]
-    known = trajectory.model.parameter_values()
-    rows = zip(*(column.tolist() for column in columns), strict=True)
-    return np.array([evaluate(contact.velocity, known | dict(zip((*names, TIME), row))) for row in rows])
+    """Return the relative velocity (k,) of a contact at times (k,), from the values (k,) of what it reads."""
+    names = (*values, TIME)
+    rows = zip(*(column.tolist() for column in (*values.values(), times)), strict=True)
+    known = (dict(parameters) | dict(zip(names, row, strict=True)) for row in rows)
+    return np.array([evaluate(contact.velocity, here) for here in known])
