@@ -14,6 +14,7 @@ from hybridsim.expr.grammar import TIME
 from hybridsim.model.parts.impact import OPEN
 from hybridsim.solution.by_name import ByName
 from hybridsim.solution.events_and_modes import EventsAndModes
+from hybridsim.solution.impulsive import impact_behind, refuse_impulses
 from hybridsim.solution.quadrature import integral
 
 
@@ -44,7 +45,8 @@ class Energies(EventsAndModes):
         Raises
         ------
         UsageError
-            Without a name, for an unknown name, a part outside the run, or a run that did not store its states.
+            Without a name, for an unknown name, a part outside the run, or a run that did not store its states. Also
+            for a quantity with the force of an impact of a `Model`, because the integral would omit its impulses.
 
         Examples
         --------
@@ -61,6 +63,7 @@ class Energies(EventsAndModes):
         for name in quantities:
             if name != TIME:
                 self.output(name, self.t_start)
+        refuse_impulses(self, quantities, "the integral")
 
         def product(times: np.ndarray) -> np.ndarray:
             factors = [
@@ -92,14 +95,15 @@ class Energies(EventsAndModes):
 
         f is the friction force of the contact, positive for a positive relative velocity v_rel. The unit is that of the
         force times that of the velocity times that of t. A contact whose law has states of its own, such as LuGre,
-        stores a part of it. The impulses of friction in impacts are not contained. After a run with impacts, the
-        printed result says so. A run that did not store its states raises `UsageError`.
+        stores a part of it. The impulses of friction in impacts are not contained. The printed result says so if a
+        contact has such impulses. A run that did not store its states raises `UsageError`.
         """
         contacts = [contact.name for contact in self.model.contacts]
         if not contacts:
             return ByName()
         found = self._integrated(self._trajectory.friction_powers, self.t_start, self.t_end, len(contacts))
-        impacts = {impact.name for impact in self.model.impacts}
+        has_impulses = hasattr(self.model, "M") or impact_behind(self.model, contacts) is not None
+        impacts = {impact.name for impact in self.model.impacts} if has_impulses else set()
         count = (
             len({e.t for e in self.events if e.component in impacts and e.source == OPEN}) if impacts else 0
         )

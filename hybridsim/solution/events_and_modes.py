@@ -13,6 +13,8 @@ from hybridsim.errors import UsageError
 from hybridsim.solution.event import Event, ModeInterval
 from hybridsim.solution.states import States
 
+KINDS = "transition", "monitor", "scheduled", "near-grazing", "corner"  # of events
+
 
 class EventsAndModes(States):
     """The events and modes of a run, as a part of `Solution`."""
@@ -58,7 +60,7 @@ class EventsAndModes(States):
     def _check_component(self, component: object, kind: object) -> None:
         self._require_events()
         if kind is not None:
-            text(kind, "kind")
+            known_name(text(kind, "kind"), KINDS, "the kind of events cannot be", "kinds")
         known = list(self._trajectory.event_names)
         known_name(component, known, "the model has no component, monitor or schedule", "names")
 

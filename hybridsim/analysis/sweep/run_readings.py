@@ -17,9 +17,11 @@ from hybridsim.errors import SimulationError, UsageError, nearest
 from hybridsim.expr import Expression, evaluate, parse, require_names
 from hybridsim.model import Model
 from hybridsim.simulate import simulate
+from hybridsim.solution.impulsive import refuse_impulses
 
 FINAL, FIRST_PASSAGE = "final", "first_passage"
 OF_QUANTITY = ("amplitude", "peak", "maximum", "minimum", "mean", "rms", "energy")
+_INTEGRATED = OF_QUANTITY[4:]
 OF_CONTACT = ("stick_fraction", "stops", "dissipated")
 OF_MODE = "mode_fraction"
 _PASSAGE = re.compile(r"first_passage\.([^<>]+)([<>])([^<>]+)")
@@ -160,6 +162,8 @@ def _reading(run: OverRun, word: str) -> float:
     if passage is not None:
         level = evaluate(passage.level, run.solution.model.parameter_values())
         return run.first_passage(passage.quantity, level, passage.is_upward)
+    if head in _INTEGRATED:
+        refuse_impulses(run.solution, [name], f"`measure` {word!r}: an integral")
     return float(run.stops(name) if head == "stops" else getattr(run, head)[name])
 
 

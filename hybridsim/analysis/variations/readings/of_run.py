@@ -25,6 +25,7 @@ from hybridsim.arguments import text
 from hybridsim.errors import UsageError, nearest
 from hybridsim.expr.grammar import TIME
 from hybridsim.presentation.readable import Readable
+from hybridsim.solution.impulsive import refuse_impulses
 from hybridsim.solution.quadrature import integral
 
 READINGS = ("minimum", "maximum", "amplitude", "integral", "mean")
@@ -104,6 +105,7 @@ class Readings:
     def of(self, reading: str, names: Sequence[str]) -> tuple[float, np.ndarray]:
         """Return the value of a reading, such as a maximum or a mean, and its derivatives (M,)."""
         if reading in ("integral", "mean"):
+            refuse_impulses(self._solution, names, f"the {reading}")
             value, slope = self._integral(names)
             share = 1.0 / (self._high - self._low) if reading == "mean" else self._sign
             return share * value, share * slope
