@@ -9,9 +9,10 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from hybridsim.engine.native.kernels import inline_always
+from hybridsim.engine.native.kernels import inline_always, inlined
 from hybridsim.engine.native.loop_hints import put
-from hybridsim.ensemble.period_map import begin_segment, carry_derivative, run_periods, solve, word_of
+from hybridsim.ensemble.approach import is_approached, solve_step
+from hybridsim.ensemble.period_map import begin_segment, carry_derivative, run_periods, word_of
 from hybridsim.ensemble.returns import relative_change
 
 NEXT, SEGMENTS_DONE = range(2)  # indices of `hybridsim.ensemble.search.Searches.at`
@@ -28,13 +29,21 @@ def close_orbit(packs: Any, searches: Any, scratch: Any, i: int, multiple: int, 
     """Find by Newton's method a motion that repeats after some periods; return its number of segments.
 
     The shortest such number of periods is entered in `searches.counts`, and the motion over them is recorded. Return
-    FAILED if the method fails; the state is then as before, that of `scratch.last`. Return NOT_CERTAIN if the motion
-    nearly repeats after a shorter time.
+    FAILED if the method fails or the run does not approach the motion. The state is then as before, that of
+    `scratch.last`. Return NOT_CERTAIN if the motion nearly repeats after a shorter time.
     """
     segments = _newton(packs, searches, scratch, i, multiple, tol)
     searches.counts[i, MULTIPLE] = multiple
-    if segments == FAILED or multiple == 1:
-        return segments
+    if segments == FAILED:
+        return FAILED
+    put(packs.record.jumps[0, 0], searches.points.starts[i])
+    length, start = multiple * searches.points.periods[i], searches.points.starts[i]
+    if not is_approached(packs, scratch, length, start, word_of(packs.rows.rows, segments)):
+        _go_back(packs.state, scratch)
+        return FAILED
+    n = start.shape[0]
+    for a in range(n):
+        put(scratch.map.matrix[a], searches.matrices[i, a])
     shorter, segments = _shortest(packs, searches.points, scratch, i, multiple, tol)
     searches.counts[i, MULTIPLE] = shorter
     return segments if segments > 0 else NOT_CERTAIN
@@ -62,13 +71,7 @@ def _newton(packs: Any, searches: Any, scratch: Any, i: int, multiple: int, tol:
             break
         before = residual
         carry_derivative(packs, packs.model.lin, segments, scratch.map)
-        for a in range(n):
-            unit = scale[a] if scale[a] > 0.0 else 1.0
-            for b in range(n):
-                rows[a, b] = -scratch.map.matrix[a, b] * (scale[b] if scale[b] > 0.0 else 1.0) / unit
-            rows[a, a] += 1.0
-            rows[a, n] = (state.x[a] - record.jumps[0, 0, a]) / unit
-        if not solve(rows):
+        if not solve_step(scratch, record.jumps[0, 0], state.x):
             break
         largest = 0.0
         for a in range(n):
@@ -76,16 +79,20 @@ def _newton(packs: Any, searches: Any, scratch: Any, i: int, multiple: int, tol:
                 largest = abs(rows[a, n])
         if residual <= tol and largest <= tol:
             searches.counts[i, NEWTON_STEPS] += step
-            for a in range(n):
-                put(scratch.map.matrix[a], searches.matrices[i, a])
             return segments
         for a in range(n):
             start[a] = record.jumps[0, 0, a] + (scale[a] if scale[a] > 0.0 else 1.0) * rows[a, n]
         put(start, state.x)
+    _go_back(state, scratch)
+    return FAILED
+
+
+@inlined
+def _go_back(state: Any, scratch: Any) -> None:
+    """Return to the state before Newton's method."""
     put(scratch.last, state.x)
     put(scratch.modes, state.z)
     begin_segment(state)
-    return FAILED
 
 
 @inline_always
@@ -95,7 +102,6 @@ def _shortest(packs: Any, points: Any, scratch: Any, i: int, multiple: int, tol:
     There are 0 segments if the motion nearly repeats earlier. multiple: number of periods after which it repeats.
     """
     state, start = packs.state, points.starts[i]
-    put(packs.record.jumps[0, 0], start)
     for shorter in range(1, multiple + 1):
         if multiple % shorter != 0:
             continue
