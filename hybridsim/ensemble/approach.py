@@ -1,6 +1,6 @@
 """This module decides in compiled code whether a run approaches a motion that Newton's method has found.
 
-The rules and their numbers are those of `hybridsim.analysis.steady.shooting.is_approached`.
+The rules and their numbers are those of `hybridsim.analysis.steady.approach`.
 """
 
 from __future__ import annotations

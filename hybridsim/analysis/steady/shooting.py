@@ -23,7 +23,6 @@ _ATTRACTS = 1.0 - 1e-6
 _DOUBLE = 1e-3  # distance of two multipliers from 1; closer ones are separated by the direction of the motion
 _CLOSE = 1e-2  # of the scale: the motion settles on a stable orbit that is so close
 _CLOSER = 0.9  # ratio of the distances in the last and the first quarter of the passages
-_COMPARED, _PREDICTED = 3, 0.05  # passages that are predicted, and the largest error relative to the distance
 
 
 @dataclass(frozen=True)
@@ -83,7 +82,7 @@ def shoot(
         rates = None
         if section is not None:
             rates = rates_at_end(solution)
-        move, longer = _newton(matrix, change, scale, section, rates)
+        move, longer = newton_step(matrix, change, scale, section, rates)
         best = replace(orbit, residual=residual, steps=count, attracts=_attracts(matrix, rates, in_family))
         # The remaining error is the step itself.
         if residual <= tol and relative(move, scale) <= tol and abs(longer) <= tol * orbit.period:
@@ -93,24 +92,6 @@ def shoot(
         if not orbit.period > 0.0:
             break
     return replace(best, converged=False)
-
-
-def is_approached(motion: Motion, orbit: Orbit, passings: Passings, is_free: bool) -> bool:
-    """Return whether the last passages approach an orbit as its derivative predicts, or are close to it.
-
-    Newton's method may reach a stable orbit on which the motion does not settle.
-    """
-    unit, away = _distances(orbit, passings)
-    away = away[: _COMPARED + 1]
-    if np.abs(away[0]).max() <= _CLOSE:
-        return True
-    solution = motion.run(orbit.start, orbit.period)
-    predicted = away[1:] @ (derivatives(solution, ()).by_start * unit[None, :] / unit[:, None]).T
-    if is_free:  # back to the section, along the flow
-        way = np.append(rates_at_end(solution), np.zeros(len(unit) - solution._system.n)) / unit
-        predicted -= np.outer(predicted[:, passings.state] / way[passings.state], way)
-    off = np.abs(predicted - away[:-1]).max(axis=1)
-    return bool((off <= _PREDICTED * np.abs(away[1:]).max(axis=1)).all())
 
 
 def is_nearing(orbit: Orbit, passings: Passings) -> bool:
@@ -140,17 +121,25 @@ def followed_closely(motion: Motion, start: Orbit, scale: np.ndarray, is_free: b
     end = point_at_end(solution)
     if end.z != start.start.z:
         return replace(start, residual=np.inf)
-    change, period = end.values - start.start.values, start.period
     rates = rates_at_end(solution) if is_free else np.zeros(0)
-    if rates.any():
-        unit = np.where(scale > 0.0, scale, 1.0)
-        way = np.append(rates, np.zeros(len(change) - len(rates))) / unit
-        late = float((change / unit) @ way / (way @ way))
-        change, period = change - late * way * unit, period - late
-    return replace(start, period=period, residual=relative(change, scale))
+    change, late = across(end.values - start.start.values, rates, scale)
+    return replace(start, period=start.period - late, residual=relative(change, scale))
 
 
-def _newton(
+def across(change: np.ndarray, rates: np.ndarray, scale: np.ndarray) -> tuple[np.ndarray, float]:
+    """Return the part of a change (n + d,) across the direction of the motion, and the time that the rest of it takes.
+
+    rates (n,): dx/dt, or empty if the period is known. The whole change counts then.
+    """
+    if not rates.any():
+        return change, 0.0
+    unit = np.where(scale > 0.0, scale, 1.0)
+    way = np.append(rates, np.zeros(len(change) - len(rates))) / unit
+    late = float((change / unit) @ way / (way @ way))
+    return change - late * way * unit, late
+
+
+def newton_step(
     matrix: np.ndarray, change: np.ndarray, scale: np.ndarray, section: int | None, rates: np.ndarray | None
 ) -> tuple[np.ndarray, float]:
     """Return the Newton correction of the start and the period."""

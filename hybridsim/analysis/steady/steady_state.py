@@ -12,6 +12,7 @@ import numpy as np
 
 from hybridsim import arguments
 from hybridsim.analysis.keyword_options import refuse_unknown
+from hybridsim.analysis.steady.approach import is_approached
 from hybridsim.analysis.steady.incommensurate import follow
 from hybridsim.analysis.steady.lyapunov import long_growth
 from hybridsim.analysis.steady.motion import (
@@ -35,7 +36,7 @@ from hybridsim.analysis.steady.settling import (
     free_passings,
     is_rest,
 )
-from hybridsim.analysis.steady.shooting import Orbit, followed_closely, is_approached, is_nearing, shoot
+from hybridsim.analysis.steady.shooting import Orbit, followed_closely, is_nearing, shoot
 from hybridsim.analysis.steady.shortest_period import after_slight_slips, with_shortest_period
 from hybridsim.analysis.steady.together import (
     EQUILIBRIUM,
@@ -347,10 +348,9 @@ class _Search:
         section = None if self.period is not None else passings.state
         found = shoot(self.motion, start, passings.scale, section, self.tol)
         self.newton_steps += found.steps
-        is_found = found.converged and found.attracts
-        return (
-            found if is_found and is_approached(self.motion, found, passings, self.period is None) else None
-        )
+        if not (found.converged and found.attracts):
+            return None
+        return found if is_approached(self.motion, passings.last, found, passings.scale, section) else None
 
     def _orbit(self, passings: Passings, multiple: int) -> Orbit:
         if self.period is not None:
