@@ -128,12 +128,8 @@ class ModelTrajectory(ModelEvents):
     def quantities(self) -> tuple[str, ...]:
         """Return the names of outputs, inputs and definitions, discrete states and relative velocities."""
         common = (q for q in self.system.quantities if " in " not in q)
-        return (
-            *common,
-            *(d.name for d in self.model.discrete),
-            *self._velocities,
-            *self._velocities_without_stick,
-        )
+        discrete = (d.name for d in self.model.discrete)
+        return (*common, *discrete, *self._velocities, *self._velocities_without_stick)
 
     @cached_property
     def _velocities(self) -> dict[str, int]:
