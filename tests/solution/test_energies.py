@@ -157,7 +157,7 @@ def test_time_stepping_measures_the_same_by_contact() -> None:
 def test_what_is_refused() -> None:
     sol = hs.simulate(block(), (0, 1))
     for call, message in (
-        (lambda: sol.integral(), "has no quantity"),
+        (lambda: sol.integral(), "got no quantity"),
         (lambda: sol.integral("w"), "no quantity 'w'"),
         (lambda: sol.integral("v", t_span=(0, 2)), "is outside the run"),
         (lambda: sol.stored_energy(), "does not declare masses"),

@@ -233,7 +233,7 @@ def test_a_long_run_is_not_repeated_for_ever(monkeypatch) -> None:
         ({"repeat": 0}, "`repeat` cannot be 0"),
         ({"integrators": []}, "no integrators"),
         ({"integrators": ["scipy-rk4"]}, "scipy-rk4"),
-        ({"integrators": ["scipy-rk45", "scipy-rk45"]}, "two lines"),
+        ({"integrators": ["scipy-rk45", "scipy-rk45"]}, "two series"),
         ({"rtols": []}, "no values of rtol are given"),
         ({"reference": "guess"}, "`reference` cannot be 'guess'"),
         ({"reference": 3}, "`reference` cannot be a int"),

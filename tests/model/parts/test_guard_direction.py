@@ -105,7 +105,7 @@ def test_a_surface_a_function_and_a_law_have_no_direction() -> None:
             components=[hs.Component("c", [hs.Mode("on", up)], surface=surface)],
         )
     function = hs.Guard("g", lambda t, x, p: x[0], "on", direction="up")
-    with pytest.raises(ModelError, match="for a Python function"):
+    with pytest.raises(ModelError, match="because it is a Python function"):
         hs.Model(
             "m",
             states={"x": 1},
