@@ -113,7 +113,7 @@ def test_json_lists_expressions_and_ratios(hybridsim: Callable) -> None:
 
 def test_a_point_that_fails_is_told_and_only_all_of_them_are_a_failure(hybridsim: Callable) -> None:
     code, out, err = hybridsim("sweep", "dfcs", "m=0.2,0", *FINAL, "--json")
-    assert code == 0 and "1 of 2 points: " in err
+    assert code == 0 and "1 of 2 points failed: " in err
     assert json.loads(out)["status"][0] == "ok"
     code, out, err = hybridsim("sweep", "dfcs", "m=0,-0*1", *FINAL)
     assert code == 1 and "of 2 points" in err

@@ -102,12 +102,12 @@ def test_a_section_that_is_never_passed_is_a_status() -> None:
 @pytest.mark.parametrize(
     "given, message",
     [
-        ({"parameter": "x"}, "x is a state, but bifurcation() varies a parameter"),
+        ({"parameter": "x"}, r"x is a state, but bifurcation\(\) varies a parameter"),
         ({"parameter": "q"}, "no parameter or state 'q'"),
         ({"samples": 0}, "`samples` cannot be 0"),
         ({"tol": 0}, "`tol` cannot be 0"),
         ({"section": 3}, "`section` cannot be 3"),
-        ({"save": "nothing"}, "sets 'save' itself"),
+        ({"save": "nothing"}, "sets the option 'save' itself"),
         ({"rtoll": 1e-8}, "'rtoll' is not an option of simulate"),
         ({"integrator": "dop853", "step": 1.0}, "'step' is not an option of simulate or of dop853"),
     ],
