@@ -189,6 +189,8 @@ def unit_of(solution: Solution, name: str) -> str:
                 remedy=nearest(name, units, kind="quantities"),
             ) from None
         model = solution.model
+        if isinstance(model, MechanicalSystem):
+            return ""
         expressions = {relative_velocity(contact.name): contact.velocity for contact in model.contacts}
         expressions |= dict(getattr(model, "definitions", ()))
         return unit_of_expression(model, expressions[name]) if name in expressions else ""

@@ -270,7 +270,7 @@ def test_readings_that_do_not_exist_are_refused() -> None:
         found.of("maximun", "h")
     with pytest.raises(hs.UsageError, match="no quantity 'x'"):
         found.of("mean", "x")
-    with pytest.raises(hs.UsageError, match="maximum has 2 quantities"):
+    with pytest.raises(hs.UsageError, match="got 2 quantities for the reading 'maximum'"):
         found.of("maximum", "h", "w")
     with pytest.raises(hs.UsageError, match="integral has 0 quantities"):
         found.of("integral")
