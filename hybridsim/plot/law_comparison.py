@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.axes import Axes
 
+from hybridsim.arguments import text
 from hybridsim.plot.shared import style
 from hybridsim.plot.shared.scale import label_axis, with_prefix
 from hybridsim.plot.shared.smooth_parts import smooth_parts_of, title_of, unit_of, window_of
@@ -27,7 +28,8 @@ def law_comparison(comparison: LawComparison, x: str | None = None) -> tuple[Axe
     ----------
     x : the quantity along the axis of the loops, such as "v" or "v_rel(f)"; by default that of the comparison.
     """
-    across, up, rows = x or comparison.quantity, comparison.contact, comparison.rows
+    across = comparison.quantity if x is None else text(x, "x")
+    up, rows = comparison.contact, comparison.rows
     figure = style.figure(9.0, max(3.6, 1.6 + 0.4 * len(rows)))
     style.put_title(figure, style.literal(comparison.title), size=10)
     loops, bars = figure.subplots(1, 2, width_ratios=(3, 2))
@@ -43,7 +45,9 @@ def law_comparison(comparison: LawComparison, x: str | None = None) -> tuple[Axe
         if row.solution.t_end > row.solution.t_start:
             parts = smooth_parts_of(row.solution, (across, up), window_of(row.solution, comparison.t_span))
             points = [np.concatenate([part.values[name] for part in parts]) for name in (across, up)]
-            loops.plot(*points, color=colour, linewidth=1.4, linestyle=("-", "--", "-.", ":")[k % 4])
+            loops.plot(
+                *points, color=colour, linewidth=1.4 + 1.4 * (k == 0), linestyle=("-", "--", "-.", ":")[k % 4]
+            )
             for axis, values in zip((across, up), points, strict=True):
                 ends[axis] += [values.min(), values.max()]
         sizes.append(_size(row, comparison))

@@ -272,7 +272,7 @@ def test_readings_that_do_not_exist_are_refused() -> None:
         found.of("mean", "x")
     with pytest.raises(hs.UsageError, match="got 2 quantities for the reading 'maximum'"):
         found.of("maximum", "h", "w")
-    with pytest.raises(hs.UsageError, match="integral has 0 quantities"):
+    with pytest.raises(hs.UsageError, match="got 0 quantities for the reading 'integral'"):
         found.of("integral")
     with pytest.raises(hs.UsageError, match="two different times"):
         found.of("mean", "h", t_span=(1, 1))
