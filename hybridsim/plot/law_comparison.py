@@ -45,9 +45,8 @@ def law_comparison(comparison: LawComparison, x: str | None = None) -> tuple[Axe
         if row.solution.t_end > row.solution.t_start:
             parts = smooth_parts_of(row.solution, (across, up), window_of(row.solution, comparison.t_span))
             points = [np.concatenate([part.values[name] for part in parts]) for name in (across, up)]
-            loops.plot(
-                *points, color=colour, linewidth=1.4 + 1.4 * (k == 0), linestyle=("-", "--", "-.", ":")[k % 4]
-            )
+            width = 1.4 if k else 2.8  # the first line is seen below the others
+            loops.plot(*points, color=colour, linewidth=width, linestyle=("-", "--", "-.", ":")[k % 4])
             for axis, values in zip((across, up), points, strict=True):
                 ends[axis] += [values.min(), values.max()]
         sizes.append(_size(row, comparison))

@@ -82,7 +82,7 @@ def test_what_cannot_be_is_named() -> None:
         sliding(["a", 0.4, 0.3], "cubic", a=0.6)
     with pytest.raises(hs.ModelError, match="law measured, table mu, values: unknown name 'zeta'"):
         sliding(["a", "zeta", 0.3], a=0.6).validate()
-    with pytest.raises(hs.ModelError, match="law measured, table mu, values: unknown name 'v'"):
+    with pytest.raises(hs.ModelError, match="law measured, table mu, values: 'v' cannot be used here"):
         sliding(["a", "v", 0.3], a=0.6).validate()
     with pytest.raises(hs.ModelError, match=r"the slip force at v = 1 cannot be -0\.4"):
         sliding(["a", "b", 0.3], a=0.6, b=-0.4).validate()
