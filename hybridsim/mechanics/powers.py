@@ -8,7 +8,7 @@ import numpy as np
 
 from hybridsim.mechanics.arrays_trajectory import ArraysTrajectory
 from hybridsim.mechanics.declaration.system import Harmonic
-from hybridsim.solution.quadrature import integral
+from hybridsim.solution.integrals.quadrature import integral
 
 SOURCES = ("forcing", "damping", "friction", "bases", "impacts")
 

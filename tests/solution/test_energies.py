@@ -9,7 +9,7 @@ import pytest
 
 import hybridsim as hs
 from hybridsim import UsageError
-from hybridsim.solution.quadrature import integral
+from hybridsim.solution.integrals.quadrature import integral
 
 MU, N, M, START = 0.3, 20.0, 2.0, 1.5
 STRIBECK = {"mu_s": 0.5, "mu_k": 0.3, "v_s": 0.1}

@@ -12,7 +12,7 @@ import numpy as np
 
 from hybridsim import arguments
 from hybridsim.analysis.keyword_options import refuse_unknown
-from hybridsim.analysis.steady.lyapunov import Growth
+from hybridsim.analysis.steady.irregular.lyapunov import Growth
 from hybridsim.analysis.steady.motion import Motion, point_at_end
 from hybridsim.analysis.variations.sizes import sizes
 from hybridsim.arguments import cannot_be

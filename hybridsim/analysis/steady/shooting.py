@@ -96,17 +96,11 @@ def shoot(
 
 def is_nearing(orbit: Orbit, passings: Passings) -> bool:
     """Return whether the last passages are closer to an orbit than the first ones, or close to it."""
-    away = np.abs(_distances(orbit, passings)[1]).max(axis=1)
-    quarter = max(len(away) // 4, 1)
-    return bool(away[0] <= _CLOSE or away[:quarter].mean() < _CLOSER * away[-quarter:].mean())
-
-
-def _distances(orbit: Orbit, passings: Passings) -> tuple[np.ndarray, np.ndarray]:
-    """Return the unit (n + d,) of each state, and the passages minus the orbit in these units, the latest first."""
-    unit = np.where(passings.scale > 0.0, passings.scale, 1.0)
-    away = (passings.values[:: -orbit.multiple] - orbit.start.values) / unit
-    away[:, passings.scale <= 0.0] = 0.0
-    return unit, away
+    moves = passings.scale > 0.0
+    away = passings.values[:: -orbit.multiple, moves] - orbit.start.values[moves]
+    distances = np.abs(away / passings.scale[moves]).max(axis=1, initial=0.0)  # the latest first
+    quarter = max(len(distances) // 4, 1)
+    return bool(distances[0] <= _CLOSE or distances[:quarter].mean() < _CLOSER * distances[-quarter:].mean())
 
 
 def followed_closely(motion: Motion, start: Orbit, scale: np.ndarray, is_free: bool) -> Orbit:

@@ -13,8 +13,8 @@ import numpy as np
 from hybridsim import arguments
 from hybridsim.analysis.keyword_options import refuse_unknown
 from hybridsim.analysis.steady.approach import is_approached
-from hybridsim.analysis.steady.incommensurate import follow
-from hybridsim.analysis.steady.lyapunov import long_growth
+from hybridsim.analysis.steady.irregular.incommensurate import follow
+from hybridsim.analysis.steady.irregular.lyapunov import long_growth
 from hybridsim.analysis.steady.motion import (
     CostsMore,
     CostsTooMuch,

@@ -17,7 +17,7 @@ from hybridsim.errors import SimulationError, UsageError, nearest
 from hybridsim.expr import Expression, evaluate, parse, require_names
 from hybridsim.model import Model
 from hybridsim.simulate import simulate
-from hybridsim.solution.impulsive import refuse_impulses
+from hybridsim.solution.integrals.impulsive import refuse_impulses
 
 FINAL, FIRST_PASSAGE = "final", "first_passage"
 OF_QUANTITY = ("amplitude", "peak", "maximum", "minimum", "mean", "rms", "energy")

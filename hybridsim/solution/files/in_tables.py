@@ -6,8 +6,8 @@ from os import PathLike
 from typing import TYPE_CHECKING
 
 from hybridsim.presentation.tables import Table, event_columns, event_frame
-from hybridsim.solution.energies import Energies
 from hybridsim.solution.files.tabulated import equal_steps
+from hybridsim.solution.integrals.energies import Energies
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -126,7 +126,7 @@ def test_errors_name_the_file_and_the_line(
         ({"v_s = 0.1": "v_s = 0.1, v_d = 1"}, "car.toml:7: contact f: the law 'pad' has no parameter", "'v_s'?", 1),
         # the line above the keys
         ({"[laws.pad]\n": ""}, "pad.toml:1: the file of a law: unknown 'parameters', ", "write the line [laws", 1),
-        # one list has to be mended, and both errors tell it
+        # both errors give the same remedy: correct the list of parameters
         (
             {'["mu", "v_s"]': '["mue", "v_s"]'},
             "pad.toml:3: law pad, slip: unknown name 'mu'",

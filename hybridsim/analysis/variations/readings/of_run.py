@@ -25,8 +25,8 @@ from hybridsim.arguments import text
 from hybridsim.errors import UsageError, nearest
 from hybridsim.expr.grammar import TIME
 from hybridsim.presentation.readable import Readable
-from hybridsim.solution.impulsive import refuse_impulses
-from hybridsim.solution.quadrature import integral
+from hybridsim.solution.integrals.impulsive import refuse_impulses
+from hybridsim.solution.integrals.quadrature import integral
 
 READINGS = ("minimum", "maximum", "amplitude", "integral", "mean")
 _AGREE = 1e-7  # of their sizes: derivatives at equal extreme values that differ by less are equal

@@ -14,8 +14,8 @@ from hybridsim.expr.grammar import TIME
 from hybridsim.model.parts.impact import OPEN
 from hybridsim.solution.by_name import ByName
 from hybridsim.solution.events_and_modes import EventsAndModes
-from hybridsim.solution.impulsive import impact_behind, refuse_impulses
-from hybridsim.solution.quadrature import integral
+from hybridsim.solution.integrals.impulsive import impact_behind, refuse_impulses
+from hybridsim.solution.integrals.quadrature import integral
 
 
 class Energies(EventsAndModes):
