@@ -108,7 +108,7 @@ def compare_laws(
 
 def measured_period(keep: Any, period: float | None, length: float) -> float | None:
     """Return the period that is measured at the end of a run of some length, or None for the whole run."""
-    if keep not in (None, "all", "last-period"):
+    if keep is not None and (not isinstance(keep, str) or keep not in ("all", "last-period")):
         raise cannot_be("keep", keep, "use 'all' or 'last-period', the part of the run that is measured")
     if keep == "all":
         return None

@@ -139,7 +139,7 @@ class Follower:
         if parted < order or amount <= 0.0:
             return off + self._off(zero, now, other)
         more = np.outer(apart / amount, np.where(other, np.abs(one.by), 0.0))
-        return off + self._off(zero, now, other & False, more)
+        return off + self._off(zero, now, np.zeros_like(other), more)
 
     def _apart(self, zero: ZeroFunction, at: Place) -> tuple[int, float, int, np.ndarray]:
         """Return k and G of g = G t**k on the other side, and p and D of the difference D t**p of the states."""
