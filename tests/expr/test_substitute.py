@@ -88,7 +88,7 @@ def test_bounds_hold_for_what_is_put_in() -> None:
 
 
 def test_a_condition_does_not_go_where_a_number_belongs() -> None:
-    with pytest.raises(ExpressionError, match="a number is needed"):
+    with pytest.raises(ExpressionError, match="must be a number, but is a condition"):
         substitute(parse("x + 1"), {"x": "a > 0"})
 
 

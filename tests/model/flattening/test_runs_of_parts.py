@@ -170,7 +170,7 @@ def test_values_of_parts_are_named_in_measures_and_questions() -> None:
     assert np.abs(table["harmonic.a.x.1"]) == pytest.approx([gain, 2 * gain], rel=1e-6)
     for quantity, message in (
         ("amplitude.a.y", "did you mean 'a.x'"),
-        ("amplitude.a.x.2", "write amplitude.a.x"),
+        ("amplitude.a.x.2", "write only amplitude.a.x"),
         ("event_time.a.x.0", "event_time"),
     ):
         with pytest.raises(hs.UsageError) as caught:
