@@ -15,16 +15,21 @@ if TYPE_CHECKING:
     from hybridsim.analysis import Comparison
     from hybridsim.analysis.compare.rows import Row
 
+_HEIGHT = 3.4
+"""The height of title and panels, in inches. The legend comes below."""
+
+_POWERS = "in brackets: powers of v$_{\\mathregular{0}}$ in the error and in the work (evaluations)"
+
 
 def regularisation(comparison: Comparison) -> tuple[Axes, Axes]:
     """Draw two panels over v0: the largest error of the states over the run, and the wall time.
 
-    The legend gives the exponents of error and work (evaluations) as v0 falls. Horizontal lines are the set-valued law.
+    The legend gives the powers of v0 that fit the error and the work (evaluations). Horizontal lines are the set-valued law.
     """
     from hybridsim.analysis.compare.regularised import exponent_text, exponents
 
-    figure = style.figure(style.WIDTH, 4.6)
-    style.put_title(figure, headline(comparison), size=10)
+    figure = style.figure(style.WIDTH, _HEIGHT)
+    style.put_title(figure, f"{headline(comparison)}\n{_POWERS}", size=10)
     errors, times = figure.subplots(1, 2)
     chosen = looks(comparison.rows)
     for label in comparison.labels:
@@ -38,7 +43,7 @@ def regularisation(comparison: Comparison) -> tuple[Axes, Axes]:
             for row in rows:
                 if not row.form:
                     panel.axhline(quantity(row), color=chosen[label].colour, linestyle=chosen[label].dashes)
-    for panel, title in ((errors, "state error, whole run / amplitude"), (times, "wall time")):
+    for panel, title in ((errors, "state error / amplitude"), (times, "wall time")):
         style.dress(panel)
         panel.set_xscale("log")
         panel.set_yscale("log")
@@ -53,10 +58,10 @@ def regularisation(comparison: Comparison) -> tuple[Axes, Axes]:
     for handle, label in zip(found, chosen, strict=False):
         if label in fitted:
             power, work = map(exponent_text, fitted[label])
-            handle.set_label(f"{handle.get_label()}: error ~ $v_0^{{{power}}}$, work ~ $v_0^{{{work}}}$")
+            handle.set_label(f"{handle.get_label()} ({power}, {work})")
         else:
             handle.set(marker="None")
-    style.legend_below(figure, found)
+    figure.set_figheight(_HEIGHT + style.legend_below(figure, found))
     return errors, times
 
 
@@ -65,5 +70,4 @@ def _error(row: Row) -> float:
 
 
 def _time(row: Row) -> float:
-
     return row.cost.wall_time if row.cost else 0.0

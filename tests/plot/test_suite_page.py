@@ -79,7 +79,7 @@ def test_regularised_runs_over_v0(tmp_path) -> None:
     assert [line.get_ydata()[0] for line in level] == [result.rows[0].errors.state]
     texts = [text.get_text() for text in times.figure.legends[0].get_texts()]
     assert texts[0] == "set-valued, dop853"
-    assert texts[1] == "tanh, dop853: error ~ $v_0^{1.00}$, work ~ $v_0^{-0.50}$"
+    assert texts[1] == "tanh, dop853 (1.00, -0.50)"
     assert save((errors, times), tmp_path / "chart.png").exists()
 
 

@@ -83,8 +83,7 @@ def point_along(axes: Axes, x: NDArray[np.float64], y: NDArray[np.float64], colo
 
 def legend_above(axes: Axes, handles: Sequence[Artist]) -> float:
     """Name curves or colours above axes, in as many rows as their width requires; return the height in points."""
-    texts = [re.sub(r"\\mathregular|[${}_]", "", str(handle.get_label())) for handle in handles]
-    widths = [len(text) + _HANDLE for text in texts] or [1]
+    widths = [_letters(handle) + _HANDLE for handle in handles] or [1]
     width = figure_of(axes).get_figwidth() * axes.get_position().width * _LETTERS
     columns = len(widths) if sum(widths) <= width else max(1, int(width / max(widths)))
     axes.legend(
@@ -111,17 +110,24 @@ def wrapped(*parts: str) -> str:
     return literal("\n".join(line for part in parts for line in textwrap.wrap(part, round(WIDTH * _LETTERS))))
 
 
-def legend_below(whole: Figure, handles: Sequence[Artist]) -> None:
-    """Name lines below all panels of a figure, in as many columns as its width allows."""
-    longest = max((len(str(handle.get_label())) for handle in handles), default=1) + _LONG_HANDLE
+def legend_below(whole: Figure, handles: Sequence[Artist]) -> float:
+    """Name lines below all panels of a figure, in as many columns as its width allows; return the height in inches."""
+    longest = max(map(_letters, handles), default=1) + _LONG_HANDLE
+    columns = max(1, min(len(handles), int(whole.get_figwidth() * _LETTERS / longest)))
     whole.legend(
         handles=handles,
         loc="outside lower center",
-        ncols=max(1, min(len(handles), int(whole.get_figwidth() * _LETTERS / longest))),
+        ncols=columns,
         frameon=False,
         fontsize=9,
         handlelength=3,
     )
+    return _ROW * math.ceil(len(handles) / columns) / 72
+
+
+def _letters(handle: Artist) -> int:
+    """Return the number of letters of a label as drawn, without the signs of mathematical text."""
+    return len(re.sub(r"\\mathregular|[${}_^]", "", str(handle.get_label())))
 
 
 def put_title(whole: Figure, text: str, size: float = 11) -> None:
