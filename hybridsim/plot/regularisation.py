@@ -24,7 +24,8 @@ _POWERS = "in brackets: powers of v$_{\\mathregular{0}}$ in the error and in the
 def regularisation(comparison: Comparison) -> tuple[Axes, Axes]:
     """Draw two panels over v0: the largest error of the states over the run, and the wall time.
 
-    The legend gives the powers of v0 that fit the error and the work (evaluations). Horizontal lines are the set-valued law.
+    The legend gives the powers of v0 that fit the error and the work (evaluations).
+    Horizontal lines are the set-valued law.
     """
     from hybridsim.analysis.compare.regularised import exponent_text, exponents
 
