@@ -195,8 +195,9 @@ from 1e-17 to 1e-1.
 PAIRS = """
 A zero is *late* if the error of its event time exceeds a limit. The limit is the sum of two parts. For a single
 zero the first part is 1e-10 of the span. The second part is 1e-10 of the size divided by the slope of the guard.
-For a zero of a pair the first part is {late:.0e} of the span. The second part is the effect of an error of the
-guard. This error is 1e-13 of the size for `exact`, and a tenth of rtol times the size for `taylor`.
+For each of two zeros that are close together, the first part is {late:.0e} of the span. The second part is the
+effect of an error of the guard. This error is 1e-13 of the size for `exact`, and a tenth of rtol times the size for
+`taylor`.
 
 If the error of a single zero is more than ten times its limit, the zero counts as *missed*. Its event then counts
 as *spurious*. The last column is for single zeros. It is the largest error of the event time, multiplied by the

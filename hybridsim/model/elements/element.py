@@ -43,7 +43,7 @@ class Element(Declared):
         continuous function of states and time.
     quantizer
         The multiple of ``step`` that is nearest to the input, with an event where it changes. Rates and outputs may
-        use it; guards, resets and contacts may not.
+        use it; guards, resets and contacts must not use it.
     delay
         The value that the input had some ticks of a schedule or clock before: one of ``ticks`` values in a queue, each
         taken at a tick. If an input jumps at a tick, its value after the jump counts; a discrete state that another

@@ -48,7 +48,7 @@ def numbers_from_file(
 def read_columns(
     path: Path, columns: Sequence[str | int] | None, first_title: str = "times", may_lack: bool = False
 ) -> tuple[tuple[float, ...], ...]:
-    """Return two columns of a CSV file as numbers: times (or arguments), which may not decrease, and values.
+    """Return two columns of a CSV file as numbers: times (or arguments), which must not decrease, and values.
 
     The separator is a comma, a semicolon or a tab. Numbers have a decimal point; a decimal comma is an error. Empty
     lines and lines that start with # are skipped. The first line contains names if a column is selected by name, or if
