@@ -122,8 +122,8 @@ fault and a remedy.
 
 ## Command lines
 
-Each command line is a correct command with one or more changes. A word is lost, doubled, moved, misspelt or
-replaced. Values have the same faults as in model files. Some values are replaced by names of devices, of folders
+Each command line is a correct command with one or more changes. A word is lost, doubled, moved, misspelt or replaced.
+The values get the faults that are listed for model files. Some values are replaced by names of devices, of folders
 and of missing files. A command that runs longer than {commanded:g} seconds is interrupted as by Ctrl-C.
 
 | ending | command lines |

@@ -243,9 +243,9 @@ dominates.
 {forms}
 
 **Release.** Let s be the time since the applied force exceeded mu N, and let the applied force be mu N + r s. With
-Coulomb's law the velocity v of the body with mass m is given by m v = r s^2/2. Let mu N - d be the friction force
-of another law. With this law the equation is m v' = r s + d. Near s = 0 there is an interval in which d and r s have the same order
-of magnitude. The error is the additional velocity at the end of this interval.
+Coulomb's law the velocity v of the body with mass m is given by m v = r s^2/2. Let mu N - d be the friction force of
+another law. With this law the equation is m v' = r s + d. Near s = 0 there is an interval in which d and r s have the
+same order of magnitude. The error is the additional velocity at the end of this interval.
 
 - `tanh`: d = 2 mu N exp(-2 v/v0). Then v is of size v0, and s is of size v0^(1/2). The velocity also has a factor
   log(1/v0), because d must decrease from mu N to r s.

@@ -126,7 +126,7 @@ class FirstSteps:
         return step
 
     def restep(self, step: Step, s: float) -> Step:
-        """Repeat a step up to s with the method that took it."""
+        """Take a step again, with the same method, but only as far as the local time s."""
         if self.is_over and step is self.last:
             self.stepper, self.is_over = self.early, False
         return self.stepper.restep(step, s)

@@ -36,7 +36,7 @@ def state_at(series: Any, x: int, d: float) -> tuple[float, float]:
 
 @inlined
 def states_at(series: Any, x: int, d: Any) -> tuple[Any, Any]:
-    """Return the values and derivatives of the polynomials in eight columns, each at its own distance d."""
+    """Return the values and derivatives of polynomials in eight columns. Each column has its own distance d."""
     wide = series.shape[1]
     value, slope = load(series, (series.shape[0] - 1) * wide + x), splat(0.0)
     for k in range(series.shape[0] - 2, -1, -1):

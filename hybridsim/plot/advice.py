@@ -84,7 +84,10 @@ def _window(errors: Iterable[float], tol: float) -> tuple[float, float]:
 
 
 def _draw(axes: Axes, k: int, step: Step, tol: float, ends: tuple[float, float]) -> None:
-    """Draw a stem from the tolerance to the error, filled if adequate; an arrow marks an error outside the axis."""
+    """Draw a line from the tolerance to the error of a model. Its end is filled if the model is adequate.
+
+    An arrow marks an error outside the axis.
+    """
     low, high = ends
     colour = style.PALETTE[0] if step.is_adequate else style.PALETTE[1]
     at = min(max(step.error, low), high)

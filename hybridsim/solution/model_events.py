@@ -47,7 +47,7 @@ class ModelEvents:
 
     @cached_property
     def corners(self) -> tuple[Event, ...]:
-        """Return the instants at which corners changed their sides, as events."""
+        """Return the instants at which the argument of a corner changed its sign, as events."""
         return tuple(Event(float(o.instant), *o[1:]) for o in self.occurrences if o.kind == "corner")
 
     @cached_property

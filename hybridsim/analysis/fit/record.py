@@ -126,7 +126,7 @@ class Record:
         for name in self.columns:
             if name not in known:
                 raise UsageError(
-                    f"model {model.name} has no quantity {name!r}, which is a column of a record",
+                    f"model {model.name} has no quantity {name!r}, but a record has a column of this name",
                     remedy=f"{nearest(name, known, kind='quantities')}; "
                     "to select and rename columns, use hs.Record(data, quantities={column: quantity}), "
                     "or --column COLUMN=QUANTITY on the command line",

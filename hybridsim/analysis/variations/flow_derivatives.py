@@ -116,7 +116,7 @@ class FlowDerivatives:
         return np.concatenate(parts) if parts else np.zeros((0, n, n + len(self._moving)))
 
     def _beside(self, number: int, tape: TangentTape, s: float) -> np.ndarray:
-        """Return derivatives (n, n + q) of the rates close to a local time at which the derivatives do not exist."""
+        """Return derivatives (n, n + q) of the rates just beside a local time at which they do not exist."""
         segment = self._segment(number)
         begin, end = float(segment.s[0]), float(segment.s[-1])
         near = np.array([s + _ISOLATED * (end - begin) * (1.0 if 2.0 * s < begin + end else -1.0)])

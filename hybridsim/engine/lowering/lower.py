@@ -191,7 +191,7 @@ class Lowering(LoweringState):
                         f"the force {declared_name(unknown[c])} does not act on the {self.title(c)} "
                         f"'{self.written(c)}' ({self.components[c].name}), and so cannot keep it at zero",
                         place=self.place(c),
-                        remedy=f"write {declared_name(unknown[c])} in the rates of both velocities with opposite signs",
+                        remedy=f"write {declared_name(unknown[c])} with opposite signs in the rates of both velocities",
                     )
                 self.never_held.add(c)
         self.partners = partners(self, surfaces, rate, effect)

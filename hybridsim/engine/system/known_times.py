@@ -57,7 +57,7 @@ class KnownTimes(NamedTuple):
         return self.instant(0) if len(self.kinds) else self.target
 
     def instant(self, i: int) -> Instant:
-        """Return the known time with a given number."""
+        """Return the known time at a given position in the list."""
         return Instant(*self.instants[i].tolist())
 
     def up_to(self, target: Instant) -> KnownTimes:

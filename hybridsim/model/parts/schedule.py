@@ -13,7 +13,7 @@ from hybridsim.model.parts.frozen_map import FrozenMap
 
 @dataclass(frozen=True)
 class Schedule(Declared):
-    """Resets, or the end of the run, at known times, which integration steps hit exactly.
+    """Resets, or the end of the run, at known times. Integration steps end exactly at these times.
 
     The k-th tick of a clock is computed as start + k*period, k = 0, 1, ..., without accumulated rounding.
 

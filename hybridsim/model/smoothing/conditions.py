@@ -149,7 +149,7 @@ class _Conditions:
         return ast.BinOp(below, ast.Add(), ast.BinOp(number_tree(factor), ast.Mult(), larger))
 
     def _factor(self, tree: ast.expr, node: ast.expr) -> float:
-        """Return the coefficient of an abs, min or max in a tree, or 0 if the tree is not linear in this function."""
+        """Return the coefficient of a function in a tree. It is 0 if the tree is not linear in the function."""
         if not (isinstance(node, ast.Call) and ast.unparse(node.func) in ("abs", "min", "max")):
             return 0.0
         slopes = [

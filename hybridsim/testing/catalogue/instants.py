@@ -98,7 +98,7 @@ def _never_crossed(solution: Any) -> list[str]:
 
 
 def _samples() -> Scene:
-    """Return the test case of a sine that is sampled whenever it has changed by 2; its extremes only touch a level.
+    """Return the test case of a sine that is sampled at each change by 2. The sine touches this level at its peaks.
 
     Whether these touches are sampled is open, and with them the first level on the way back.
     """

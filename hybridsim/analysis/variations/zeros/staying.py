@@ -271,7 +271,7 @@ def _value(changes: Changes, zero: ZeroFunction, at: Place) -> Changed:
 
 
 def _side(system: System, zero: ZeroFunction) -> float:
-    """Return the sign of the function on the side of zero that the run takes."""
+    """Return the sign of the function just after it leaves zero in the run."""
     is_below = zero.surface >= 0 and zero.here == system.automata[zero.c].below
     return -1.0 if is_below else 1.0
 

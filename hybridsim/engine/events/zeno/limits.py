@@ -54,7 +54,7 @@ def _gathered(
 
 
 def _without_bounces(system: System, outcome: Outcome, p: np.ndarray, near: list[int]) -> np.ndarray:
-    """Return the state after impulses that stop some contacts and keep closed contacts closed."""
+    """Return the state after impulses that stop some contacts and let no closed contact open."""
     automata, modes, of = system.automata, outcome.z, system.surface_of
     if not system.is_unilateral[near].any():
         return outcome.x
