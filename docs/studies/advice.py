@@ -3,12 +3,12 @@
     python docs/studies/advice.py [points]            (500 by default; they make docs/studies/advice.md)
 
 Points (F0/N, r) are drawn evenly from [0.5, 1.5] x [0.05, 2]. The question is the steady amplitude of x within 1 %.
-In brute force the full motion is the closed form of the oscillator, event by event. It is followed from rest until the
-free vibration has decayed below rounding. The amplitude without friction and with equivalent viscous damping is a
-formula. Den Hartog's form holds if the motion has no stops. The regularized models are plain runs of the same length.
-Their method is `dop853`, or `rodas5p` if stability would limit `dop853` to a million steps. Their extremes come from
-samples. The advice stops a model that has become ten times as expensive as the full model. Such a model is run to its
-end here.
+In brute force the full motion is the closed form of the oscillator, event by event. It is followed from rest until
+the free vibration has decayed below rounding. The amplitude without friction and with equivalent viscous damping is
+a formula. Den Hartog's form holds if the motion has no stops. The regularized models are plain runs of the same
+length. Their method is `dop853`, or `rodas5p` if stability would limit `dop853` to a million steps. Their extremes
+come from samples. The advice stops a model that has become ten times as expensive as the full model. Such a model is
+run to its end here.
 """
 
 from __future__ import annotations
@@ -183,16 +183,17 @@ def page(
     lines = [
         "# Does the advice name the right model?",
         "",
-        "Does `advise` name the simplest adequate model? Its answer differs from a search through all "
-        f"models at **{len(wrong) + len(near) + len(dear)}** of {count} random points.",
+        "Does `advise` name the simplest adequate model? The answer of `advise` differs from a search "
+        f"through all models at **{len(wrong) + len(near) + len(dear)}** of {count} random points.",
         "",
-        f"`python docs/studies/advice.py` draws {count} points in a map of the reference model `dfcs`. "
-        "The ratio F0/N of forcing to normal load is between 0.5 and 1.5. The ratio r of the forcing "
-        "frequency to the natural frequency is between 0.05 and 2. For each point `advise` names the "
-        f"simplest model whose steady amplitude of x is within {100 * TOL:g} %. The script then searches for "
+        f"`python docs/studies/advice.py` draws {count} points in a map of the reference model `dfcs`. The "
+        "ratio F0/N of forcing to normal load is between 0.5 and 1.5. The ratio r of the forcing frequency "
+        "to the natural frequency is between 0.05 and 2. For each point `advise` names the simplest model "
+        f"whose steady amplitude of x has an error of at most {100 * TOL:g} %. The script then searches for "
         "this model by brute force, with a run of every model:",
         "",
-        "- The full motion is computed in closed form, from rest until the free vibration has decayed.",
+        "- The motion of the full model is computed in closed form, from rest until the free vibration has "
+        "decayed.",
         "- Formulas give the amplitude of the models without friction and with equivalent viscous damping.",
         "- The regularized models are simulated over the same time.",
         "",
@@ -230,10 +231,11 @@ def page(
         "(../images/advice-map.png)",
         "",
         "*The map shows the answers of `advise` on a grid with N = 40 N. Below F0 = 20 N nothing moves. For "
-        "motions with stops, the simplest adequate model is usually Karnopp's with a v0 of 1 % of the "
-        "largest speed. At some frequencies the simplest adequate model is the one with tanh or arctan and "
-        "this v0. Runs of these models take at least as long as runs of the full model. For motions without "
-        "stops, Den Hartog's formula is exact. Near resonance equivalent viscous damping is adequate.*",
+        "motions with stops, the simplest adequate model is usually Karnopp's model, with v0 equal to 1 % "
+        "of the largest speed. At some frequencies the simplest adequate model is friction regularized by "
+        "tanh or arctan, with the same v0. Runs of these three models take at least as long as runs of the "
+        "full model. For motions without stops, Den Hartog's formula is exact. Near resonance equivalent "
+        "viscous damping is adequate.*",
         "",
     ]
     return "\n".join(lines)

@@ -2,8 +2,8 @@
 
     python docs/studies/blade_damper.py [--loads 33]
 
-Writes docs/studies/blade-damper.md and docs/images/blade-damper.png. The model is models/blade-damper.toml. The limits
-of no damper and of a stuck damper have closed forms. The optimum is compared with that of the first harmonic.
+Writes docs/studies/blade-damper.md and docs/images/blade-damper.png. The model is models/blade-damper.toml. The
+limits of no damper and of a stuck damper have closed forms. The optimum is compared with that of the first harmonic.
 """
 
 from __future__ import annotations
@@ -181,17 +181,16 @@ def page(found: hs.Sweep, blade: Blade) -> str:
 
 Which normal load N makes the damper under the platform of a turbine blade most effective? The best load in this study
 is **{loads[best]:.1f} N**, with a resonant amplitude of {
-        1e3 * peaks[best]:.4f} mm. Without a damper the resonant
-amplitude is {ends[0] / peaks[best]:.1f} times as large. With a damper that always sticks, the amplitude is {
-        ends[1]
-        / peaks[
-            best
-        ]:.1f} times as large. With a very small load, the damper dissipates almost nothing. With a very
-large load, the damper sticks, and only makes the blade stiffer.
+        1e3 * peaks[best]:.4f} mm. Without a damper the resonant amplitude is {
+        ends[0] / peaks[best]:.1f} times as
+        large as with the best load. With a damper that always sticks, it is {
+        ends[1] / peaks[best]:.1f} times as
+        large as with the best load. With a very small load, the damper dissipates almost nothing. With a very large
+        load, the damper sticks, and only makes the blade stiffer.
 
 The model `models/blade-damper.toml` is one mode of the blade with a Jenkins element (Griffin 1980,
-[doi:10.1115/1.3230256](https://doi.org/10.1115/1.3230256)). `python docs/studies/blade_damper.py` runs one `hs.sweep`
-over N. For each load the script finds the largest amplitude over the frequency.
+[doi:10.1115/1.3230256](https://doi.org/10.1115/1.3230256)). The script `python docs/studies/blade_damper.py` runs
+one `hs.sweep` over N. For each load the script finds the largest amplitude over the frequency.
 
 ![Response over frequency, resonant amplitude and work per cycle over the load](../images/blade-damper.png)
 
@@ -210,19 +209,22 @@ over N. For each load the script finds the largest amplitude over the frequency.
         1e3 * ends[1]:.6f} mm.
   At N = {loads[-1]:g} N the relative difference of the sweep from this peak is {off[1]:.1e}.
 - **Work.** For any motion with the amplitude A and two reversals per period, the loop of the force f over x is a
-  parallelogram. Its area is 4 mu N (A - mu N/k_d). At all loads at which the damper slips, the integrated work differs
-  from this area by at most {work:.1e}.
+  parallelogram. The area of this loop is 4 mu N (A - mu N/k_d). At all loads at which the damper slips, the
+  integrated work differs from this area by at most {work:.1e}.
 - **First harmonic.** Assume x = A cos(theta) at resonance. The forcing then does the work pi F0 A per cycle. The
   damping c and the damper dissipate pi c omega A^2 + 4 mu N (A - mu N/k_d). The work and the losses are equal. For
-  c = 0 and with P = mu N, this equation gives A = 4 P^2/(k_d (4 P - pi F0)). The smallest amplitude is
-  **A = pi F0/k_d** = {1e3 * math.pi * blade.force / blade.kd:.4f} mm at **N =
-  pi F0/(2 mu)** = {loads[formula]:.2f} N, with the stiffness k_b + k_d/2. With the damping c (line in the
-  picture) the smallest amplitude is {
-        1e3 * harmonic[formula]:.4f} mm. In the sweep the smallest amplitude is {
-        1e3 * peaks[formula]:.4f} mm. Below N = pi F0/(4 mu) = {
-        loads[formula] / 2:.1f} N friction alone cannot limit the
-  resonance. Over all loads the amplitude of the first harmonic differs from the sweep by up to {
-        100 * float(np.max(abs(harmonic / peaks - 1.0))):.2f} %.
+  c = 0 and with P = mu N, the balance of work and losses gives A = 4 P^2/(k_d (4 P - pi F0)). The smallest amplitude
+  is **A = pi F0/k_d** = {1e3 * math.pi * blade.force / blade.kd:.4f} mm at **N = pi F0/(2 mu)** =
+  {
+        loads[
+            formula
+        ]:.2f} N, with the stiffness k_b + k_d/2. With the damping c (line in the picture) the smallest
+  amplitude is {1e3 * harmonic[formula]:.4f} mm. In the sweep the smallest amplitude is {
+        1e3 * peaks[formula]:.4f}
+  mm. Below N = pi F0/(4 mu) = {
+        loads[formula] / 2:.1f} N friction alone cannot limit the resonance. Over all loads
+  the amplitude of the first harmonic differs from the sweep by up to
+  {100 * float(np.max(abs(harmonic / peaks - 1.0))):.2f} %.
 """
 
 

@@ -164,12 +164,12 @@ The model `models/mode-coupling.toml` is the model of Hoffmann, Fischer, Allgaie
 [doi:10.1016/S0093-6413(02)00254-9](<https://doi.org/10.1016/S0093-6413(02)00254-9>)). A block pressed on a belt moves
 along and across the belt. Friction couples the two motions, because the normal load depends on the motion across the
 belt. The coefficient of friction is constant, so the squeal is not caused by friction that decreases with the
-speed. The page [Find the onset of squeal](../how-to/squeal.md) treats that cause. The script `python
-docs/studies/brake.py` finds the onset in three ways:
+speed. The page [Find the onset of squeal](../how-to/squeal.md) treats squeal from friction that decreases with the
+speed. The script `python docs/studies/brake.py` finds the onset in three ways:
 
 - **Closed form.** While the block slides, the eigenvalues lambda of the motion satisfy lambda^2 + c lambda + 2 =
-  +-sqrt(1 - 4 mu/3). Up to mu = 3/4 both motions decay with the rate c/2. At mu = 3/4 their frequencies are equal. For
-  a larger mu one of the motions grows if c is small enough. At the onset of growth, one eigenvalue is i sqrt(2).
+  +-sqrt(1 - 4 mu/3). Up to mu = 3/4 both motions decay with the rate c/2. At mu = 3/4 their frequencies are equal.
+  For a larger mu one of the motions grows if c is small enough. At the onset of growth, one eigenvalue is i sqrt(2).
 - **Linearization.** `hs.linearize` in the mode `slip-` gives the coefficient at which its `growth` is zero.
 - **Simulation.** The run starts {SHAKE:g} away from steady sliding, and lasts {WATCHED:g} units of time without an
   event. The script fits a matrix that maps the states at one time to the states {STEP:g} later (dynamic mode
@@ -181,8 +181,8 @@ docs/studies/brake.py` finds the onset in three ways:
 {table}
 
 The last two columns are the largest differences from the closed form between mu = {FRICTION[0]:g} and
-{FRICTION[-1]:g}. The differences are largest at mu = 3/4. Two eigenvalues are equal there, so a small error of the
-matrix changes them by its square root.
+{FRICTION[-1]:g}. The differences are largest at mu = 3/4. At mu = 3/4 two eigenvalues are equal. A small error of
+the matrix then changes them by the square root of this error.
 
 ![Growth of a small disturbance, and the final amplitude, over the coefficient of friction](../images/brake.png)
 

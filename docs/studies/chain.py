@@ -2,8 +2,8 @@
 
     python docs/studies/chain.py [OUT_DIR]
 
-hybridsim is compared with heyoka, if it is installed (it is in the extra `rivals`), and with a simple fixed-step RK4 in
-numba with bisection.
+hybridsim is compared with heyoka, if it is installed (it is in the extra `rivals`), and with a simple fixed-step RK4
+in numba with bisection.
 """
 
 from __future__ import annotations
@@ -132,14 +132,14 @@ systems.
     return f"""# A chain of blocks: what an event costs
 
 How does the cost of an event grow with the number of blocks n? In hybridsim the time per event grows as
-n^{exponent:.2f}. The time per event is the time of a run divided by its number of events. Therefore it
-includes the steps between the events.
+n^{exponent:.2f}. The time per event is the time of a run divided by its number of events. Therefore the time per
+event includes the steps between the events.
 
 `hs.chain_on_belt(n)` is a chain of blocks of mass 1 on a belt of speed {BELT}. A leaf spring holds each block,
 and a coupling spring joins neighbouring blocks. The leaf springs have a stiffness of {LEAF}, and the coupling springs
-of {COUPLING}. The friction force at the slip velocity v is 1/(1 + {DELTA:g}|v|), and the initial positions are random.
-`python docs/studies/chain.py` runs the methods in turn several times. The table contains the shortest time of each
-method. Every run finished. {machine()}
+of {COUPLING}. The friction force at the slip velocity v is 1/(1 + {DELTA:g}|v|), and the initial positions are
+random. The script `python docs/studies/chain.py` runs the methods in turn several times. The table contains the
+shortest time of each method. Every run finished. {machine()}
 
 When the study began, other programs used {load:.1f} of {os.cpu_count()} processors. These programs made all times
 longer. Ratios of times are uncertain by a factor of two.
@@ -154,10 +154,10 @@ The table gives milliseconds per unit of simulated time. The number in brackets 
 ![Time per event against the number of blocks](../images/chain.png)
 
 After an event hybridsim restarts only the few neighbouring blocks whose series changes by more than a tenth of the
-tolerance. At the end of a step it expands the series of all blocks, once for all events of the step. The other
-methods restart all blocks at each event. For these methods the cost of an event is therefore proportional to n.
+tolerance. At the end of a step hybridsim expands the series of all blocks, once for all events of the step. The other
+methods restart all blocks at each event. For the other methods the cost of an event is therefore proportional to n.
 {verdict} hybridsim and heyoka control their error. RK4 with h = {STEP:g} has no error control. When RK4 releases a
-block, it changes the speed of the block by 1e-14, so that the block does not stop again at once. The program siconos
+block, it changes the speed of the block by 1e-14. Otherwise the block would stop again at once. The program siconos
 was not run, because PyPI has no wheel of siconos (`pip download siconos` finds no version).
 """
 

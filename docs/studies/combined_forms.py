@@ -3,9 +3,9 @@
     python docs/studies/combined_forms.py [structures] [draws] [journal]        (2000 and 10 make the page)
     python docs/studies/combined_forms.py shrink STRUCTURE DRAW INTEGRATOR      (a small model that shows the same)
 
-The generator and the judge are in tests/reference/combined. The runs use two processes. A process that does not return
-in time is ended and counts as a finding, and the next set of numbers follows. With a journal the same command continues
-where it stopped. SEEDS="3 17" in the environment selects these structures instead.
+The generator and the judge are in tests/reference/combined. The runs use two processes. A process that does not
+return in time is ended and counts as a finding, and the next set of numbers follows. With a journal the same command
+continues where it stopped. SEEDS="3 17" in the environment selects these structures instead.
 """
 
 from __future__ import annotations
@@ -142,18 +142,18 @@ def pairs(seeds: list[int]) -> tuple[Counter[str], Counter[tuple[str, str]]]:
 
 HEAD = """# Combined forms
 
-Do runs of models with many combined features agree with an independent solver? Of {runs} runs {agree} agree and
-{differ} differ. The tables below list the other runs.
+Do runs of models with many combined features agree with an independent solver? Of {runs} runs, {agree} agree with
+this solver and {differ} differ from it. The tables below list all runs that do not agree.
 
-`python docs/studies/combined_forms.py` draws whole models at random. It compares each run with an independent solver,
-which shares no code with hybridsim. On this page this solver is called *the judge*. A *form* is an element of a
-model, such as an impact, or a way to write an expression. The models combine these forms:
+`python docs/studies/combined_forms.py` draws whole models at random. The script compares each run with an
+independent solver, which shares no code with hybridsim. On this page this solver is called *the judge*. A *form* is
+an element of a model, such as an impact, or a way to write an expression. The models combine these forms:
 
 - Every number is a literal, a parameter, an expression of parameters, a definition, a discrete state or an input.
 - Guards, loads, gaps, laws, rates, monitors and resets contain `max`, `min`, `abs` and conditionals. Each of these
   functions is written in one of several equivalent ways.
-- Forces, loads and speeds of belts change at known times. These changes are written as single conditions, Boolean
-  combinations of conditions, tables or waves.
+- Forces, loads and speeds of belts change at known times. The changes at known times are written as single
+  conditions, Boolean combinations of conditions, tables or waves.
 - Runs start on a guard, at rest or on a corner. Schedules, clocks, impacts, contacts, relays and monitors have
   events at the same instant.
 - Parts of a model depend on states of other parts. Some expressions use a definition.
@@ -161,18 +161,19 @@ model, such as an impact, or a way to write an expression. The models combine th
   ten is stopped in the middle and resumed.
 
 A *structure* is a random model without its numbers. Each structure gets several random sets of numbers. Each set of
-numbers runs with two integrators. The first is an integrator of hybridsim or the default, and the second is drawn at
-random. The first structures are selected so that no pair of forms is rare. Each of them is the best of {pool} random
-structures. The best structure has the most pairs of forms that are still in fewer than {enough} structures. The later
-structures are not selected. Parts of a model are drawn independently, so all pairs of forms are possible.
+numbers runs with two integrators. The first integrator is the default or another one of hybridsim, and the second is
+drawn at random. The first structures are selected so that no pair of forms is rare. Each selected structure is the
+best of {pool} random structures. The best structure has the most pairs of forms that are still in fewer than
+{enough} structures. The later structures are not selected. Parts of a model are drawn independently, so all pairs of
+forms are possible.
 
 *The judge* (`tests/reference/combined`) reads an abstract form of the model, and not the model file. The judge
 computes the motion by Taylor series for each combination of modes. It finds zeros by dense sampling and bisection. At
 an instant with an event it tries every combination of modes and of branches of `abs`, `min`, `max` and conditionals.
 A combination is admissible if its conditions are true just after the instant. The judge also finds impulses by trying
 all combinations. If a run disagrees, the judge computes the motion again in 40 digits. A run is compared only as long
-as the motion is certain. The comparison ends in two cases. In the first case a guard comes closer to zero than 1e-6
-and turns back. In the second case the rules permit several motions.
+as the motion is certain. The comparison ends if a guard comes closer to zero than 1e-6 and turns back. It also ends
+if the rules permit several motions.
 
 A run *agrees* if two conditions are met. First, at {points} times all states and discrete states differ from those of
 the judge by at most {allowed:g} of the size of the motion. Second, all monitors fire as often as with the judge. Two
@@ -201,8 +202,8 @@ def page(done: list[dict[str, Any]], draws: int) -> str:
     )
     instants = sum(r.get("instants", 0) for r in runs)
     counts = f"There are {len(seeds)} structures with {draws} sets of numbers each. Each set runs with two "
-    counts += "integrators. Some sets of numbers give no valid model, or no motion that is certain. There "
-    counts += f"remain {len(runs)} runs, with {instants} instants of events."
+    counts += "integrators. Some sets of numbers give no valid model, or no motion that is certain. "
+    counts += f"The other sets give {len(runs)} runs, with {instants} instants of events."
     out += textwrap.fill(counts, 118) + "\n\n"
     out += "| result | runs |\n| --- | --- |\n"
     out += "".join(f"| {kind} | {count} |\n" for kind, count in kinds.most_common())

@@ -98,9 +98,9 @@ The base of a contact is at rest or moves. The applied forces are harmonic. Each
 rtol {RTOL:g}.
 
 At each event the script tries all combinations of stick, slip forward and slip backward for the contacts at rest.
-For each combination it computes the accelerations, the forces and two time derivatives of the forces. It solves the
-whole system of equations in 40 digits. hybridsim uses another method, with a Delassus operator and pivoting. The
-combination that hybridsim selects must be admissible.
+For each combination it computes the accelerations, the forces and two time derivatives of the forces. The script
+solves the whole system of equations in 40 digits. hybridsim uses another method, with a Delassus operator and
+pivoting. The combination that hybridsim selects must be admissible.
 
 Each system also runs with its coordinates and contacts declared in {ORDERS} other orders. The columns "orders
 apart" give the largest difference of the final states between these runs and the first run.
@@ -110,12 +110,12 @@ apart" give the largest difference of the final states between these runs and th
 {table}
 
 If static and kinetic friction are equal, the motion is unique. The script nevertheless counts several admissible
-combinations at some instants, because its test is not strict. The test treats values below 1e-9 as zero. It uses
-only two derivatives of the forces, and none for redundant sets of contacts.
+combinations at some instants, because its test is not strict. The test treats values below 1e-9 as zero. The test of
+the script uses only two derivatives of the forces, and none for redundant sets of contacts.
 
 If static friction exceeds kinetic friction, several motions may be possible. hybridsim first assumes stick in all
-contacts that may stick. It then releases the contacts whose force exceeds the limit. The final states of two orders
-of declaration differ because of rounding.
+contacts that may stick. Then hybridsim releases the contacts whose force exceeds the limit. The final states of two
+orders of declaration differ because of rounding.
 
 ## Work and energy
 

@@ -139,10 +139,11 @@ def page(rows: list[str], never: list[float]) -> str:
 How much do monitors, clocks, tables and impacts add to the time of a run? With a linear monitor that never fires, a
 run takes {min(never):.2f} to {max(never):.2f} times as long as without it.
 
-`exact`, `taylor` and `dop853` run from event to event in compiled code. There an ordinary event takes a few
-microseconds. Other events take about a millisecond, because Python code handles them. An example is an event at which
-the modes of several components are selected together. With `exact`, Python code also handles monitors that are not
-polynomials of the states. A monitor of the sliding speed costs little: its sign is the mode of the contact.
+`exact`, `taylor` and `dop853` run from event to event in compiled code. In compiled code an ordinary event takes a
+few microseconds. Other events take about a millisecond, because Python code handles them. An example is an event at
+which the modes of several components are selected together. With `exact`, Python code also handles monitors that are
+not polynomials of the states. A monitor of the sliding speed costs little, because the mode of the contact gives the
+sign of this speed.
 
 An impact at a single contact is an ordinary event. Python code handles an impact that strikes several contacts or
 loads friction.

@@ -123,8 +123,9 @@ fault and a remedy.
 ## Command lines
 
 Each command line is a correct command with one or more changes. A word is lost, doubled, moved, misspelt or replaced.
-The values get the faults that are listed for model files. Some values are replaced by names of devices, of folders
-and of missing files. A command that runs longer than {commanded:g} seconds is interrupted as by Ctrl-C.
+The values in a command line are made faulty in the same ways as the numbers and expressions in a model file. Some
+values are replaced by names of devices, of folders and of missing files. A command that runs longer than
+{commanded:g} seconds is interrupted as by Ctrl-C.
 
 | ending | command lines |
 | --- | --- |
@@ -143,10 +144,10 @@ Each case runs in a process that records what the case does:
 An exception, a warning, an undocumented exit code, a failure without a message, and a hang are faults. Under
 `--json`, output that is not JSON is a fault too.
 
-All faults that earlier runs found are fixed, and each has a test in `tests/fuzz/test_found.py`. Most faults were
-caused by very large or very small numbers, whose squares or quotients are infinite. In one fault the bound of a
-guard was not a number, so that the search for a zero never ended. In other faults a message contained a very long
-word. The tests of the package also run a few random cases of each kind.
+All faults that earlier runs found are fixed, and each has a test in `tests/fuzz/test_found.py`. Most of the faults
+found earlier were caused by very large or very small numbers, whose squares or quotients are infinite. In one fault
+the bound of a guard was not a number, so that the search for a zero never ended. In other faults a message contained
+a very long word. The tests of the package also run a few random cases of each kind.
 """
 
 
@@ -168,7 +169,9 @@ def page(found: dict[str, list[Case]]) -> str:
         line_rows=rows["lines"],
         commanded=COMMANDED,
         limit=LIMIT,
-        verdict=f"These cases do: {', '.join(faulty)}." if faulty else "No case of this study does.",
+        verdict=f"These cases do: {', '.join(faulty)}."
+        if faulty
+        else "In this study no file and no command line causes an internal error.",
     )
 
 

@@ -165,19 +165,20 @@ Does hybridsim ever miss a zero of a guard? Of {zeros} single zeros of {count} r
 Two zeros may also be so close together that rounding decides whether they exist. The tables below count such pairs.
 
 `python docs/studies/guards.py` draws {count} random guards, half for `exact` and half for `taylor` (rtol
-{rtol:.0e}). It compares every mode change of the runs with an independent solution. This solution uses a closed
-form of each guard g, with exactly the numbers of the run. It computes zeros and distances from zero in 40 digits.
+{rtol:.0e}). The script compares every mode change of the runs with an independent solution. This solution uses a
+closed form of each guard g, with exactly the numbers of the run. The independent solution computes zeros and
+distances from zero in 40 digits.
 
 A model has two modes. The guard of one mode is g, and the guard of the other mode is -g. Therefore the mode changes
 at each zero of g. After the change, the guard of the new mode starts at zero. The run must not count this zero as
 another event.
 
 - For `exact` the guard g is a random sum of terms that linear modes can produce. The guards are polynomials up to
-  degree six, sums of two sines, or motions of a damped driven oscillator. A fourth kind is the sum of two
+  degree six, sums of two sines, or motions of a damped driven oscillator. Some guards are the sum of two
   exponentials, a sine and t exp(-e t).
 - For `taylor` the guard g is a product of factors, which have up to five zeros in all. The factors are polynomials
-  or trigonometric functions of t or of a state. Two further factors are positive. One of them depends on a state
-  with a nonlinear rate.
+  or trigonometric functions of t or of a state. The product also has two positive factors. One of these factors
+  depends on a state with a nonlinear rate.
 
 Most guards have one or two minima or maxima close to zero. The distance of such an extreme value from zero is
 called the *depth*. If g turns back after it has passed zero, there is a *pair* of zeros. Two zeros closer than 1 %
@@ -193,20 +194,20 @@ from 1e-17 to 1e-1.
 | --- | --- | --- | --- | --- | --- | --- |
 """
 PAIRS = """
-A zero is *late* if the error of its event time exceeds a limit. The limit is the sum of two parts. For a single
-zero the first part is 1e-10 of the span. The second part is 1e-10 of the size divided by the slope of the guard.
-For each of two zeros that are close together, the first part is {late:.0e} of the span. The second part is the
-effect of an error of the guard. This error is 1e-13 of the size for `exact`, and a tenth of rtol times the size for
-`taylor`.
+A zero is *late* if the error of its event time exceeds a limit. For a single zero this limit is the sum of two
+parts. The first part is 1e-10 of the span. The second part is 1e-10 of the size divided by the slope of the guard.
+For each zero of a pair, the first part of the limit is {late:.0e} of the span. The second part is the effect of an
+assumed error of the guard. The assumed error is 1e-13 of the size for `exact`, and a tenth of rtol times the size
+for `taylor`.
 
-If the error of a single zero is more than ten times its limit, the zero counts as *missed*. Its event then counts
-as *spurious*. The last column is for single zeros. It is the largest error of the event time, multiplied by the
-slope of the guard and divided by the size.
+If the error of a single zero is more than ten times its limit, the zero counts as *missed*. The event of a missed
+zero counts as *spurious*. The last column of the table is for single zeros. It gives the largest error of an event
+time, multiplied by the slope of the guard and divided by the size.
 
 ## Pairs, by depth over size
 
-A pair is *found* if both zeros are found. It is *flagged* if no zero is found, but a near-grazing is reported. It is
-*lost* if both zeros are missed without a report, or if only one zero is found.
+A pair is *found* if both zeros are found. A pair is *flagged* if no zero is found, but a near-grazing is reported. A
+pair is *lost* if both zeros are missed without a report, or if only one zero is found.
 
 | depth | exact found | flagged | lost | taylor found | flagged | lost |
 | --- | --- | --- | --- | --- | --- | --- |
@@ -214,8 +215,8 @@ A pair is *found* if both zeros are found. It is *flagged* if no zero is found, 
 MISSES = """
 ## Near misses, by depth over size
 
-A near miss is *passed* if there is neither an event nor a report. It is *flagged* if a near-grazing is reported. It
-is *crossed* if the run has events, although the guard has no zero there.
+A near miss is *passed* if there is neither an event nor a report. A near miss is *flagged* if a near-grazing is
+reported. A near miss is *crossed* if the run has events, although the guard has no zero.
 
 | depth | exact passed | flagged | crossed | taylor passed | flagged | crossed |
 | --- | --- | --- | --- | --- | --- | --- |
@@ -233,7 +234,7 @@ The deepest pair that was only flagged has a depth of {exact:.1e} of the size fo
 
 Every pair whose depth exceeds ten times the bound is found. Every other pair {lost}.
 
-Run `python docs/studies/guards.py [guards]` to repeat the study. It takes {minutes:.0f} minutes on one core.
+Run `python docs/studies/guards.py [guards]` to repeat the study. The study takes {minutes:.0f} minutes on one core.
 """
 
 

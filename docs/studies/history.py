@@ -2,11 +2,11 @@
 
     python docs/studies/history.py [models] [runs] [journal]     (100 and 1000 make docs/studies/history.md)
 
-For each model a process makes runs with other numbers, in random order. Between them, after them, and on other threads
-at the same time, it makes the run of each integrator. Other processes make only one run each. They have an empty cache
-of compiled models, or the cache that the first process left. With a journal the same command continues where it
-stopped. ONLY="belt combined-58" in the environment selects these models instead. PAGE=1 writes the page of the
-models that are in the journal.
+For each model a process makes runs with other numbers, in random order. Between them, after them, and on other
+threads at the same time, it makes the run of each integrator. Other processes make only one run each. They have an
+empty cache of compiled models, or the cache that the first process left. With a journal the same command continues
+where it stopped. ONLY="belt combined-58" in the environment selects these models instead. PAGE=1 writes the page of
+the models that are in the journal.
 """
 
 from __future__ import annotations
@@ -388,7 +388,7 @@ HEAD = """# Does a run depend on earlier runs?
 Does the result of a run depend on earlier runs in the same process? {compared} runs were made after other runs, and
 {differ} of them differ from the same run in a new process.
 
-`python docs/studies/history.py` tests up to 100 models. They are the models of the package, three chains of blocks,
+`python docs/studies/history.py` tests up to 100 models. The models are those of the package, three chains of blocks,
 and random models ([combined forms](combined-forms.md)). This page shows the results for {models} models, of which
 {many} has more than {limit} combinations of modes. For such a model the process keeps a table of the combinations
 that its runs have reached. Earlier runs therefore change this table.
@@ -401,20 +401,21 @@ For each model one process makes {runs} other runs, in random order and by rando
 - Some runs go backward in time.
 - Some runs use another model, or a second `Model` object with the same content.
 
-The *compared run* is a run of the model with its declared numbers. The same process makes it with each integrator.
-First it searches for spans over which the runs are short. The columns of the table name the times at which it makes
-the compared runs:
+The *compared run* is a run of the model with its declared numbers. The same process makes the compared run with each
+integrator. First this process searches for spans over which the runs are short. The columns of the table name the
+times at which it makes the compared runs:
 
 - *After the search for spans* means that no other run has been made.
 - *After 1*, *after 30* and *after 1000* mean that this number of other runs has been made.
 - *Again* means that the compared runs are made a second time after the 1000 runs.
 - *Equal model* means that the compared runs use a second `Model` object with the same content.
-- *On a thread* means that all integrators run at the same time on one thread each. Two further threads make other runs.
+- *On a thread* means that all integrators run at the same time on one thread each. Two further threads make other
+  runs.
 
-The reference is the same run in a new process. This process makes no other run, and starts with an empty cache of
+The reference is the same run in a new process. The new process makes no other run. It starts with an empty cache of
 compiled models. The last column of the table is for a new process that uses the cache of the process with {runs}
-runs. All results are compared bit for bit. The comparison includes the status, the message, the warnings, the
-events with the states before and after them, all steps, and the dense output at {points} times.
+runs. All results are compared bit for bit. The comparison includes the status, the message, the warnings, all steps,
+and the dense output at {points} times. It also includes the events, with the states before and after them.
 
 """
 

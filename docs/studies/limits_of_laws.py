@@ -2,8 +2,8 @@
 
     python docs/studies/limits_of_laws.py
 
-Writes docs/studies/limits-of-laws.md and docs/images/limits-of-laws.png. The set-valued law is the oscillator's closed
-form (tests/reference), which shares no code with the package.
+Writes docs/studies/limits-of-laws.md and docs/images/limits-of-laws.png. The set-valued law is the oscillator's
+closed form (tests/reference), which shares no code with the package.
 """
 
 from __future__ import annotations
@@ -213,10 +213,10 @@ order depends on the law and on the events of the motion. With `karnopp` the err
 order 1 at a reversal. With the spring-like laws the error is only of order 1/2 at a reversal. The observed orders
 agree with theory.
 
-Each law has a small parameter. For a regularized law it is the velocity v0 below which the friction force changes
-its sign. For a spring-like law it is the inverse of the contact stiffness. `python docs/studies/limits_of_laws.py`
-runs the oscillator `dfcs` with mu_s = mu_k over {PERIODS} periods. It compares the motion with a closed form of the
-motion with Coulomb's law. There are three scenes:
+Each law has a small parameter. For a regularized law this parameter is the velocity v0. The friction force changes
+its sign at speeds below v0. For a spring-like law the parameter is the inverse of the contact stiffness. The script
+`python docs/studies/limits_of_laws.py` runs the oscillator `dfcs` with mu_s = mu_k over {PERIODS} periods. The
+script compares the motion with a closed form of the motion with Coulomb's law. There are three scenes:
 
 | scene | forcing and start | time in stick | releases | reversals without stick |
 | --- | --- | --- | --- | --- |
@@ -244,29 +244,30 @@ dominates.
 
 **Release.** Let s be the time since the applied force exceeded mu N, and let the applied force be mu N + r s. With
 Coulomb's law the velocity v of the body with mass m is given by m v = r s^2/2. Let mu N - d be the friction force of
-another law. With this law the equation is m v' = r s + d. Near s = 0 there is an interval in which d and r s have the
-same order of magnitude. The error is the additional velocity at the end of this interval.
+another law. With this other law, the equation of motion is m v' = r s + d. Near s = 0 there is an interval in which
+d and r s have the same order of magnitude. The error is the additional velocity at the end of this interval.
 
-- `tanh`: d = 2 mu N exp(-2 v/v0). Then v is of size v0, and s is of size v0^(1/2). The velocity also has a factor
-  log(1/v0), because d must decrease from mu N to r s.
+- `tanh`: d = 2 mu N exp(-2 v/v0). The velocity v is then of size v0, and the time s is of size v0^(1/2). The
+  velocity also has a factor log(1/v0), because d must decrease from mu N to r s.
 - `arctan`: d = (2/pi) mu N v0/v. The velocity v is of size s^2, and d is of size s. Therefore s^3 is of size v0,
   and v is of size v0^(2/3).
-- `dahl`, `lugre`: d = mu N exp(-sigma x/(mu N)), with the stiffness sigma. Then x is of size 1/sigma, s of size
-  sigma^(-1/3) and v of size sigma^(-2/3). The damping of the bristles is sqrt(sigma_0 m) v d/(mu N), which is
-  smaller than d by a factor of sigma^(-1/6).
+- `dahl`, `lugre`: d = mu N exp(-sigma x/(mu N)), with the stiffness sigma. The displacement x is then of size
+  1/sigma, the time s of size sigma^(-1/3) and the velocity v of size sigma^(-2/3). The damping of the bristles is
+  sqrt(sigma_0 m) v d/(mu N), which is smaller than d by a factor of sigma^(-1/6).
 - `jenkins`: d = 0 when the force reaches mu N. At each stop the body begins to vibrate on the spring of the
   contact. This vibration causes the error, because its amplitude at the release is of size 1/k.
 - `karnopp`: the release is located exactly. At the stop before the release, the body sticks too early by the time
   v0/a, where a is its deceleration. The distance to the true position of the stop is v0^2/(2 a).
 
-**Reversal.** The friction force changes by 2 mu N. With Coulomb's law this change is a jump.
+**Reversal.** At a reversal the friction force changes by 2 mu N. With Coulomb's law this change is a jump.
 
 - `tanh`, `arctan`, `karnopp`: the change takes the time v0/a, where a is the acceleration. The velocity then has an
   error of size v0. With `arctan` the force approaches its limit slowly, like v0/(a s) after the time s. The
   integral of this difference over s gives an error of size v0 log(1/v0).
 - `jenkins`, `dahl`, `lugre`: during the change the body moves by a distance of size 1/stiffness. The body starts
-  from rest with a finite acceleration, so this takes a time of size stiffness^(-1/2). The error of the velocity is
-  of the same size. If a body reverses without stick, a spring-like law is therefore a poor model of Coulomb's law.
+  from rest with a finite acceleration, so this movement takes a time of size stiffness^(-1/2). The error of the
+  velocity is also of size stiffness^(-1/2). If a body reverses without stick, a spring-like law is therefore a poor
+  model of Coulomb's law.
 
 ## References
 

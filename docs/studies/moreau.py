@@ -211,10 +211,11 @@ TEXT = """# At which order does time stepping converge?
 At which order of the step does time stepping converge? All orders of `moreau` lie between {least:.2f} and
 {most:.2f}, in ten scenes with friction and impacts.
 
-`moreau` does not locate events, and does not use the mode selection of the other integrators. `python
-docs/studies/moreau.py` runs ten scenes with {levels} step sizes. Each step size is half of the previous one. The
-reference is `exact` or `taylor` at rtol 1e-11, which locate every event. The place of an impact within its step is
-random, so single errors scatter. Each error is therefore a mean over {neighbours} neighbouring step sizes.
+The integrator `moreau` does not locate events. It does not use the mode selection of the other integrators. The
+script `python docs/studies/moreau.py` runs ten scenes with {levels} step sizes. Each step size is half of the
+previous one. The reference is `exact` or `taylor` at rtol 1e-11, which locate every event. The place of an impact
+within its step is random, so single errors scatter. Each error is therefore a mean over {neighbours} neighbouring
+step sizes.
 
 ![Errors over the step](../images/moreau.png)
 
@@ -239,8 +240,8 @@ scenes have errors of first order, for these reasons:
 - A friction force that depends on the speed is evaluated at the end of the step, as in `belt`.
 - The time of an impact is accurate to one step only, as in all scenes with impacts.
 
-No scene has a grazing impact. The time of a grazing impact depends on the square root of a parameter. Its error
-would therefore be larger.
+No scene has a grazing impact. The time of a grazing impact depends on the square root of a parameter. The error of a
+grazing impact would therefore be larger.
 
 The scenes with impacts have these motions:
 
@@ -270,10 +271,11 @@ largest impulse. Times are on one core of a machine that also ran other programs
 {works}
 
 With the option `theta` = 1/2, the sum of all works in a step equals the gain of kinetic and elastic energy. The
-last column gives the error of this balance, relative to the work of the belt. It consists of rounding errors. The
-works of friction and impacts are negative, so neither of them adds energy. A contact becomes active in the first
-step in which its gap would close by the middle of the step. A gap may therefore become negative. This overlap is at
-most 1 - e/2 times the distance that the two blocks approach in a step. No overlap in this study exceeds this limit.
+last column gives the error of this balance, relative to the work of the belt. This error consists of rounding
+errors. The works of friction and impacts are negative, so neither of them adds energy. A contact becomes active in
+the first step in which its gap would close by the middle of the step. A gap may therefore become negative. This
+overlap is at most 1 - e/2 times the distance that the two blocks approach in a step. No overlap in this study
+exceeds this limit.
 """
 
 

@@ -36,11 +36,11 @@ METHODS: tuple[tuple[str, Method, Method], ...] = (
 HEAD = """# The published methods at their own speed
 
 How much slower are the published methods in hybridsim than the same methods written by hand for one system?
-hybridsim takes {least:.2f} to {most:.2f} times as long.
+hybridsim takes {least:.2f} to {most:.2f} times as long as the code written by hand.
 
 `python docs/studies/published_speed.py` compares the integrators `rk4-dichotomy` and `rk4-sign` with code that is
-written by hand. Both use the methods of a [published study](he2026.md). The code by hand is for the system of this
-study only, and is compiled by numba (`docs/studies/rivals/published_rk4.py`).
+written by hand. hybridsim and this code use the methods of a [published study](he2026.md). The code by hand is for
+the system of that study only, and is compiled by numba (`docs/studies/rivals/published_rk4.py`).
 
 - Each run has 100 periods of 1200 steps. In each of {turns} turns, every method runs once. {machine}
 - For hybridsim, the time is the processor time of `hs.simulate(..., keep="events")` and of reading the times and
@@ -50,7 +50,7 @@ study only, and is compiled by numba (`docs/studies/rivals/published_rk4.py`).
 - If the velocity is set to zero in stick, the code written by hand computes no stages in stick. If the velocity is
   kept, the friction force at every stage equals the applied force, as in Eq. 4 of the paper.
 - With `rk4-sign` the sign of the velocity changes in each step in which the body should stick. Rounding affects the
-  number of these changes. The two numbers of events may therefore differ.
+  number of these changes. Therefore hybridsim and the code by hand may find different numbers of events.
 
 | method | scene | events, ours | by hand | median ms, ours | by hand | ratio |
 | --- | --- | --- | --- | --- | --- | --- |

@@ -146,28 +146,30 @@ Are the errors of runs as small as the tolerance requests? Of {runs} runs of ran
 allowed error.
 
 `python docs/studies/random_models.py` makes 200 random structures, and runs each structure with {draws} random sets
-of parameters and initial values. It compares every run with a reference at four times. Three of these times are
-between steps, as a test of the dense output. The fourth is the end of the run.
+of parameters and initial values. The script compares every run with a reference at four times. Three of these times
+are between steps, as a test of the dense output. The fourth time is the end of the run.
 
 - There are 100 dense linear systems x' = A x + f phi(t) of one to eight states. There are six kinds of matrices A.
   A *generic* matrix has random elements. An *oscillatory* matrix causes about ten oscillations in a run. A
   *defective* matrix has fewer eigenvectors than states. Its elements are exact. A *nearly defective* matrix differs
   from a defective matrix by 1e-4 to 1e-15. A *stiff* matrix has a ratio of rates from 10 to 1e4. For a *very stiff*
-  matrix this ratio is from 1e4 to 1e8. Only `exact` and `rodas5p` run systems of this last kind. The forcing phi is
-  zero, constant, a polynomial, an exponential, a sine, or t exp(-e t) cos(w t). The reference is a matrix
+  matrix this ratio is from 1e4 to 1e8. Only `exact` and `rodas5p` run systems with a very stiff matrix. The forcing
+  phi is zero, constant, a polynomial, an exponential, a sine, or t exp(-e t) cos(w t). The reference is a matrix
   exponential in integers of {bits} bits.
 - There are 80 systems of one to four states with random smooth expressions (sums, products, quotients, roots, exp,
   sin, cos, tanh, atan). The reference is a Taylor series in integers, with about 18 correct digits.
 - There are 20 coupled stiff nonlinear systems of two to four states. The exact solution of each state is a sine. In
-  14 systems the ratio of rates is from 10 to 1e4. In 6 systems it is from 1e4 to 1e8, and only `rodas5p` runs them.
+  14 systems the ratio of rates is from 10 to 1e4. In 6 systems this ratio is from 1e4 to 1e8. Only `rodas5p` runs
+  these 6 systems.
 
 The error of a run is the largest error of a state, relative to the largest state of the run. The table gives the
 error in units of rtol. The values of rtol are {asked}.
 
-`exact` has no tolerance, so its error has another unit. This unit is an error that no floating-point computation
-can avoid, and is the sum of two parts. The first part is 2^-53 of the largest state. For the second part, all
-numbers of the model are changed at random by at most a relative 2^-53. The second part is the largest change of the
-motion in three such trials. The change of basis in `exact` may multiply such an error by a hundred.
+`exact` has no tolerance, so its error has another unit. The unit for `exact` is an error that no floating-point
+computation can avoid. This unit is the sum of two parts. The first part is 2^-53 of the largest state. For the
+second part, all numbers of the model are changed at random by at most a relative 2^-53. The second part is the
+largest change of the motion in three such trials. The change of basis in `exact` may multiply such an error by a
+hundred.
 
 A run is *within* the tolerance if its error is at most {within:.0f} units. For `exact` the limit is {exact:.0e}
 units, which is 1e-12. A method controls only the error of each step. The effect of these errors at the end depends
@@ -180,22 +182,23 @@ ORDERS = """
 ## Orders
 
 Twenty of the systems with smooth expressions run with fixed steps. The order is log2 of the ratio between the
-errors with the steps h and h/2. It is computed at the smallest h for which the errors are above 1e-13. Rounding
-then has no influence.
+errors with the steps h and h/2. The order is computed at the smallest h for which the errors are above 1e-13.
+Rounding then has no influence.
 
 | integrator | order claimed | median observed | from | to |
 | --- | --- | --- | --- | --- |
 """
 PROPORTIONS = """
-The second table tests the error estimators on the same systems. It gives the slope of the logarithm of the error over
-the logarithm of rtol, for rtol between 1e-4 and 1e-10. A slope of 1 means an error proportional to the tolerance. The
-order of `taylor` depends on the tolerance.
+The second table tests the error estimators on the same systems. For rtol between 1e-4 and 1e-10, this table gives
+the slope of the logarithm of the error over the logarithm of rtol. A slope of 1 means an error proportional to the
+tolerance. The order of `taylor` depends on the tolerance.
 
 | integrator | median | from | to |
 | --- | --- | --- | --- |
 """
 TAIL = """
-Run `python docs/studies/random_models.py [draws]` to repeat the study. It takes {minutes:.0f} minutes on one core.
+Run `python docs/studies/random_models.py [draws]` to repeat the study. The study takes {minutes:.0f} minutes on one
+core.
 """
 
 

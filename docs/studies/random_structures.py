@@ -72,14 +72,15 @@ other method, and {disagree} disagree.
 
 `python docs/studies/random_structures.py` makes random models and compares each run with another method. The other
 method shares no code with hybridsim. The form of a random model is called its structure. A structure has one to
-four masses with springs, dampers and forces (constant, sines, square waves). It also has up to three of these kinds
-of components:
+four masses with springs, dampers and forces (constant, sines, square waves). A structure also has up to three of
+these kinds of components:
 
-- One to three friction contacts. They act on the ground, on a belt or between bodies. Their laws are Coulomb,
-  static above kinetic, Stribeck, asymmetric and viscous. The loads may vary and become zero.
+- One to three friction contacts. These contacts act on the ground, on a belt or between bodies. The friction laws
+  are Coulomb, static above kinetic, Stribeck, asymmetric and viscous. The normal loads may vary and become zero.
 - Switching surfaces with random rates on each side.
 - Unilateral contacts with restitution, with a wall, a moving wall or another body.
-- Components with modes. They are bilinear springs, hysteresis, kicks by a reset, saturations and a thermostat.
+- Components with modes. These components are bilinear springs, hysteresis, kicks by a reset, saturations and a
+  thermostat.
 - Monitors.
 
 The numbers of each structure are drawn {draws} times, and each set of numbers is called a draw. The draws of a
@@ -87,10 +88,10 @@ structure are run in turn by `dop853` (rtol 1e-9), `taylor` (rtol 1e-10) and, if
 integrators also runs the draw, and the two runs are compared.
 
 The *other method* is time stepping without location of events (`tests/reference/stepped_structures.py`). The forces
-of a step satisfy the laws at the end of the step. The method is of first order. It runs with 2003, 4327 and 8923
-steps. If these runs are not accurate enough, it uses up to 568 019 steps. All these numbers of steps are prime, so
-the errors of the runs are independent. The reason is that the steps of two runs have only the start and the end in
-common.
+of a step satisfy the laws at the end of the step. The method is of first order. The other method runs with 2003,
+4327 and 8923 steps. If these runs are not accurate enough, this method uses up to 568 019 steps. All these numbers
+of steps are prime. Therefore the steps of two runs have only the start and the end in common. The errors of the runs
+are then independent.
 
 The positions of the other method are compared with those of hybridsim at 100 times. The error of the other method
 is estimated from the differences between its runs. The error of a method of first order is proportional to the
@@ -101,8 +102,8 @@ estimates. The verdicts are defined as follows:
   of the motion, or below 2 % in runs with the most steps. The run by the second integrator must end with the same
   status. The two runs by hybridsim must not differ by more than the effect of a change of the start by 1e-6.
 - A run is *sensitive* if a change of the start by 1e-5 changes the result of the other method by more than 3e-3.
-  The causes are grazing impacts, stops that barely happen, and chaos. The run must agree up to the time at which
-  the change exceeds 3e-3.
+  The causes of this sensitivity are grazing impacts, stops that barely happen, and chaos. A sensitive run must agree
+  up to the time at which the change exceeds 3e-3.
 - A run is *unresolved* if the other method has not converged at its smallest step.
 - A run *disagrees* in all other cases.
 

@@ -149,18 +149,18 @@ How much longer does a run take if the same model runs again with other numbers?
 takes {min(ratios):.2f} to {max(ratios):.2f} times as long as a call with the old value.
 
 A loop may call `hs.simulate` for one model with many values of a parameter or of the start. hybridsim compiles and
-checks the structure of the model only once. For new numbers it does four things:
+checks the structure of the model only once. For new numbers hybridsim does four things:
 
-- It repeats the checks that depend on the numbers.
-- It evaluates the parameters that are expressions of other parameters.
-- It determines the modes at the start in compiled code.
-- It computes the tables of linear modes.
+- hybridsim repeats the checks that depend on the numbers.
+- hybridsim evaluates the parameters that are expressions of other parameters.
+- Compiled code determines the modes at the start.
+- hybridsim computes the tables of linear modes.
 
 `python docs/studies/repeated_runs.py` writes this page. The table gives medians of processor time. All calls run in
 one process, in which the kinds of calls alternate. A call is a run with `keep="events"`, and includes reading the
 times and states of all events. Each new value differs from the old value in the eighth digit, so the events do not
-change. A call "by name" passes the name of the model. It is compared with a call that passes the model as an
-object. {machine()}
+change. A call "by name"
+passes the name of the model. It is compared with a call that passes the `Model` object. {machine()}
 
 {table}
 

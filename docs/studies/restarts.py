@@ -69,17 +69,17 @@ Does a run start correctly on a guard after an event? Of {clear} restarts that r
 had a spurious event, and {missed} missed an event.
 
 After an event a new segment of the run starts, often at a state at which a guard is zero. hybridsim then decides
-whether this guard fires. `python docs/studies/restarts.py` makes random restarts on guards and near guards. An
-independent computation in exact arithmetic, called the oracle, decides each restart for the same numbers. In most
-restarts some quantities are zero by definition ([events](../explanation/events.md)). They are zero in the oracle
-too.
+whether this guard fires. The script `python docs/studies/restarts.py` makes random restarts on guards and near
+guards. An independent computation in exact arithmetic, called the oracle, decides each restart for the same numbers.
+In most restarts some quantities are zero by definition ([events](../explanation/events.md)). These quantities are
+zero in the oracle too.
 
 hybridsim computes the Taylor series of the guard, with an error bound for each coefficient. Coefficients that are
-zero by definition are skipped, and the next coefficient decides. A restart is *clear* if the true value of this
-coefficient is more than twice its error bound. For a clear restart the verdict of hybridsim must be the true
-verdict. All other restarts are *inside the error bound*, and follow another rule. A coefficient within its bound
-counts as zero, and the next coefficient decides. If no coefficient decides, the verdict is "undecided", and the
-mode does not change.
+zero by definition are skipped, and the next coefficient decides. A restart is *clear* if the true value of the
+deciding coefficient is more than twice its error bound. For a clear restart the verdict of hybridsim must be the
+true verdict. All other restarts are *inside the error bound*, and follow another rule. In these restarts a
+coefficient within its bound counts as zero, and the next coefficient decides. If no coefficient decides, the verdict
+is "undecided", and the mode does not change.
 
 ## Verdicts
 
@@ -88,16 +88,16 @@ expression at a random state. Each expression is used for 500 sets of numbers. A
 value of the guard is then zero to the last bit, or differs from zero by 1e-19 to 1. In three of ten restarts the
 rate of the guard is changed in the same way.
 
-The other rows are for guards of the oscillator that is described under "Whole runs". Its parameters vary over
-decades, and the restart is up to 10^6 periods after the start. The applied force is at the limit of friction or
-very near to it.
+The other rows are for guards of the oscillator that is described under "Whole runs". The parameters of this
+oscillator vary over decades. The restart is up to 10^6 periods after the start. The applied force is at the limit of
+friction or very near to it.
 
 | restart | judged | clear | spurious | missed | inside, decided | undecided | against the rule | error/bound |
 | --- | --- | --- | --- | --- | --- | --- | --- | --- |
 """
 SEARCHES = """
-A restart is *spurious* if hybridsim finds that the guard fires, but the oracle does not. It is *missed* if the
-oracle finds that the guard fires, but hybridsim does not. *Inside, decided* means that the first coefficient is
+A restart is *spurious* if hybridsim finds that the guard fires, but the oracle does not. A restart is *missed* if
+the oracle finds that the guard fires, but hybridsim does not. *Inside, decided* means that the first coefficient is
 within its bound, so that a higher derivative decides. The last column is the largest error of a computed
 coefficient, divided by its bound. The bounds are valid if this quotient is below 1.
 
@@ -113,15 +113,15 @@ zeros by Sturm's method in integers. The columns "stays" and "leaves" count sear
 """
 RUNS = """
 A search is *open* if the computed function is at some time within its error bound. The function may then be zero at
-this time. Another method, which samples the guard, searches again. *Start inside* means that the leading
-coefficient at the start is within its bound.
+this time. After an open search, another method searches again by sampling the guard. *Start inside* means that the
+leading coefficient at the start is within its bound.
 
 ## Whole runs
 
-A run has {periods} periods of a random forced oscillator with friction, at rtol 1e-8. It begins at a random time.
-The mass sticks, is released, slips, and sticks again. Each run is compared with a closed form. There are four kinds
-of oscillators. In the first kind mu_s = mu_k. In the second kind mu_s is greater than mu_k. In the third kind mu_s
-is greater than mu_k by only a relative 1e-14 to 1e-2. The fourth kind has no damping.
+A run has {periods} periods of a random forced oscillator with friction, at rtol 1e-8. The run begins at a random
+time. The mass sticks, is released, slips, and sticks again. Each run is compared with a closed form. There are four
+kinds of oscillators. In the first kind mu_s = mu_k. In the second kind mu_s is greater than mu_k. In the third kind
+mu_s is greater than mu_k by only a relative 1e-14 to 1e-2. The fourth kind has no damping.
 
 | integrator | runs | mode changes | releases | spurious | missed | late | cut short | with a warning |
 | --- | --- | --- | --- | --- | --- | --- | --- | --- |
@@ -130,7 +130,8 @@ TAIL = """
 An event is *late* if its error exceeds 1e-5 of a period. A slip after a release is *cut short* if it lasts less
 than half of its true duration. A possible cause is a wrong direction of slip.
 
-Run `python docs/studies/restarts.py [restarts]` to repeat the study. It takes {minutes:.0f} minutes on one core.
+Run `python docs/studies/restarts.py [restarts]` to repeat the study. The study takes {minutes:.0f} minutes on one
+core.
 """
 
 

@@ -148,28 +148,29 @@ def page(
     return f"""# Limits of fixed steps and of zones around zero velocity
 
 How long may a fixed step be, and how wide may a zone around zero velocity be? In the two systems of this study,
-`rk4-dichotomy` needs 250 steps per period and a zone of at most 0.5 % of the largest speed. These values hold if
-the method sets the velocity to zero in stick. The table below has the values for all methods.
+`rk4-dichotomy` needs 250 steps per period and a zone of at most 0.5 % of the largest speed. These values hold
+if the method sets the velocity to zero in stick. A table below has the values for all methods.
 
-For these methods you choose the step h and the width of a zone around v = 0. In this zone the velocity counts as
-zero. The width of the zone is eps_v of `rk4-dichotomy`, or v0 of a regularized law. `python
+For methods with a fixed step you choose the step h and the width of a zone around v = 0. In this zone the velocity
+counts as zero. The width of the zone is eps_v of `rk4-dichotomy`, or v0 of a regularized law. The script `python
 docs/studies/stability.py` measures the limits of step and zone. The two systems are the reference model `dfcs` and
-the block on a `belt`. `dfcs` has several values of the frequency ratio r = omega/omega_n, and of the ratio F0/N of
-the forcing to the normal load. The case r = 0.6 with F0/N = 0.75 is P1 of the
+the block on a `belt`. The model `dfcs` has several values of two ratios. The ratio r = omega/omega_n is that of the
+frequencies, and F0/N is that of the forcing to the normal load. The case r = 0.6 with F0/N = 0.75 is P1 of the
 [comparison](../explanation/comparison.md). The case r = 0.64 with F0/N = 0.55 is P2.
 
 Each run starts on the exact steady motion. `exact` computes this motion for the reference model, and `steady_state`
 for the belt. The run lasts 40 periods, of which the last 10 are evaluated. With Karnopp's band the run lasts 12
-periods, of which the last 4 are evaluated. With `rk4-sign` it lasts 100 periods, of which the last 50 are
+periods, of which the last 4 are evaluated. With `rk4-sign` the run lasts 100 periods, of which the last 50 are
 evaluated. A run is **right** if the number of stops is correct and the amplitude is within 1 % in each evaluated
 period. The width of a zone is given as a share of the largest relative speed.
 
 ## Recommended values
 
 These values hold for the two systems of this study. One system is a body on a spring with Coulomb friction and
-harmonic forcing. The other is a block on a belt with friction that decreases with the speed. Other systems may need
-a narrower zone. Examples are a body that drifts, static friction above kinetic friction, and several contacts. For
-such a system, compare a run with a second run whose zone has half the width. This page does not cover impacts.
+harmonic forcing. The other system is a block on a belt with friction that decreases with the speed. Other systems
+may need a narrower zone. Examples are a body that drifts, static friction above kinetic friction, and several
+contacts. For such a system, compare a run with a second run whose zone has half the width. This page does not cover
+impacts.
 
 | method | zone, as a share of the largest speed | steps per period, at least | beyond |
 | --- | --- | --- | --- |
@@ -185,9 +186,10 @@ The option `eps_v` is a speed in the unit of the model. If the largest speed is 
     hybridsim run dfcs --integrator rk4-dichotomy --option eps_v=5e-4 \\
         --option stick_velocity=zero --option steps_per_period=500
 
-`stick_velocity=kept` selects the method in the row with the kept velocity. `model.regularized("tanh", v0=5e-5)` and
-`model.regularized("karnopp", v0=5e-4)` are the regularized laws, for `rk4-sign` or any other integrator. The law
-`tanh` supports only models whose static friction does not exceed kinetic friction. Other models raise an error.
+`stick_velocity=kept` selects the method in the row with the kept velocity. The models `model.regularized(\"tanh\",
+v0=5e-5)` and `model.regularized("karnopp", v0=5e-4)` have regularized laws. They run with `rk4-sign` or any other
+integrator. The law `tanh` supports only models whose static friction does not exceed kinetic friction. With other
+models `tanh` raises an error.
 
 You do not know the largest speed in advance. Just above the threshold of motion this speed is small, and a zone
 then causes the largest errors. Run the model once, read the largest speed, and compare the zone with it. Near the
@@ -216,8 +218,8 @@ These runs have 2000 steps per period, and 20000 with tanh. "None" means that th
 width at which RK4 is stable. With tanh, runs in still narrower zones may be right although the velocity chatters,
 as the picture below shows.
 
-The next table gives the number of steps per period above which all runs are right. Here the zone has a third of the
-width in the table above.
+The next table gives the number of steps per period above which all runs are right. In this table the zone has a
+third of the width in the table above.
 
 | case | {heads} |
 | {rule} |
@@ -234,25 +236,25 @@ runs, whose starts are shifted by equal parts of a step. All other results of th
 | {rule} |
 {published}
 
-If the velocity is set to zero, the published setting is right in every case. Its zone is at most 4 % of the largest
-speed. In the case in which the zone is 4 %, even a zone of 11 % would be right. If the velocity is kept, as in Eq.
-4 of the paper, the setting is right for a body that never sticks. It is also right for r = 0.6 with F0/N = 0.75 and
-above. It is wrong in every other case. The error grows towards the threshold of motion, where the map of the paper
-has its largest values. For tanh with v0 = 8e-4 m/s, the result is wrong in half of the cases. `rk4-dichotomy` needs
-only a fifth of the 1200 steps. If its zone is too wide, more steps do not help. `rk4-sign` may need ten times as
-many steps as the published setting.
+If the velocity is set to zero, the published setting is right in every case. The published zone is at most 4 % of
+the largest speed. In the case with 4 %, even a zone of 11 % would be right. If the velocity is kept, as in Eq. 4 of
+the paper, the setting is right for a body that never sticks. The setting with the kept velocity is also right for r
+= 0.6 with F0/N = 0.75 and above. It is wrong in every other case. The error grows towards the threshold of motion,
+where the map of the paper has its largest values. For tanh with v0 = 8e-4 m/s, the result is wrong in half of the
+cases. The method `rk4-dichotomy` needs only a fifth of the 1200 steps. If the zone is too wide, more steps do not
+help. The method `rk4-sign` may need ten times as many steps as the published setting.
 
 ![How the boundary moves with r and F0/N](../images/stability-moves.png)
 
 *On each line the error of the amplitude is 1 %. For some zones nearly as wide as the largest speed, tanh has two
 lines, one above the other. Between these lines the error changes its sign, so a run is right there by accident.*
 
-If the velocity is set to zero, the limit of the zone is an almost constant share of the largest speed. It is 9 to
-15 % if the body sticks, and 1 to 2 % if the body only reverses. If the velocity is kept, the limit is 0.2 to 0.8 %,
-and is smallest for long sticks. For tanh the limit is 0.15 % to 2.3 %, and follows no such rule. In m/s, a limit is
-smaller if the largest speed is smaller. An example is r = 0.6. If F0/N decreases from 0.75 to 0.54, the limit for
-the velocity set to zero decreases from 0.034 to 0.0022 m/s. The limit for the kept velocity decreases from 1.8e-3
-to 4e-5 m/s.
+If the velocity is set to zero, the limit of the zone is an almost constant share of the largest speed. This share is
+9 to 15 % if the body sticks, and 1 to 2 % if the body only reverses. If the velocity is kept, the limit is 0.2 to
+0.8 %, and is smallest for long sticks. For tanh the limit is 0.15 % to 2.3 %, and follows no such rule. In m/s, a
+limit is smaller if the largest speed is smaller. An example is the case r = 0.6. If F0/N decreases from 0.75 to
+0.54, the limit for the velocity set to zero decreases from 0.034 to 0.0022 m/s. The limit for the kept velocity
+decreases from 1.8e-3 to 4e-5 m/s.
 
 ![Error of rk4-sign over the step](../images/stability-sign.png)
 
@@ -265,14 +267,14 @@ the derivative of G with respect to an outward speed at the release.
 **Velocity set to zero, zone too wide.** Stops are too early. If the method stops a body at the speed eps_v, the
 position of the stop has an error of eps_v^2/(2 a). This error occurs at every stop. The error of the amplitude
 reaches 1 % at eps_v^2/(2 a) = 0.01 X (1 - G_x). On the belt the extreme of x is reached before the stop, when the
-relative speed is that of the belt. There the limit is at (eps_v - v_belt)^2/(2 a) = 0.02 X. This formula gives 41 %
-of V, and the measured limit is 36 %. If eps_v is above V, the body sticks as soon as the applied force permits
-stick. This false stick causes an error of the amplitude of 75 %.
+relative speed is that of the belt. On the belt the limit is therefore at (eps_v - v_belt)^2/(2 a) = 0.02 X. This
+formula gives 41 % of V, and the measured limit is 36 %. If eps_v is above V, the body sticks as soon as the applied
+force permits stick. This false stick causes an error of the amplitude of 75 %.
 
-**Velocity kept, zone too wide.** The body creeps in stick. When it should stick, it moves at up to eps_v by the
-distance eps_v t_stick. It then begins its slip with the speed eps_v in the wrong direction. The limit of the zone
-is at eps_v (t_stick + (G_x t_stick + G_v)/(1 - G_x)) = 0.01 X. On the belt the friction decreases with the speed. A
-slip that begins with a wrong speed moves away from the true slip. The limit is therefore 0.34 %.
+**Velocity kept, zone too wide.** The body creeps in stick. When the body should stick, it moves at a speed of up to
+eps_v, by the distance eps_v t_stick. The body then begins its slip with the speed eps_v in the wrong direction. The
+limit of the zone is at eps_v (t_stick + (G_x t_stick + G_v)/(1 - G_x)) = 0.01 X. On the belt the friction decreases
+with the speed. A slip that begins with a wrong speed moves away from the true slip. The limit is therefore 0.34 %.
 
 | case | early stop: theory | measured | creep: theory | measured | late release: theory, at most | measured |
 | --- | --- | --- | --- | --- | --- | --- |
@@ -285,10 +287,10 @@ the applied force e. The friction force therefore reverses before the velocity. 
 by m eps_v (1/(e - mu N) - 1/(e + mu N)). This error is of first order in eps_v, and a zone of 1 % of V is already
 too wide. From 4 % of V on, the body sticks at the reversal (F0/N = 1).
 
-**Zone too narrow.** The dichotomy halves the step 16 times at most. Then the speed is up to a h/2^16 (dotted line).
-If the zone is narrower than this speed, the method continues with a speed outside of the zone. In the reference
-model this has no effect if the step is short enough. On the belt, with fewer than about 90 steps per period, sticks
-are missed.
+**Zone too narrow.** The dichotomy halves the step 16 times at most. After 16 halvings the speed is up to a h/2^16
+(dotted line). If the zone is narrower than this speed, the method continues with a speed outside the zone. In the
+reference model such a speed has no effect if the step is short enough. On the belt, with fewer than about 90 steps
+per period, sticks are missed.
 
 **Step too long.** Releases are late, and stops are missed. A release is placed at the end of its step. If the
 release is a whole step late, the slip ends at another place. The column "late release" of the table above gives the
@@ -300,7 +302,7 @@ law for the side before v = 0. This law, 1/(1 + delta v), has a pole at v = -1/d
 grows without bound.
 
 **`rk4-sign`.** The velocity chatters. In place of stick, the velocity changes its sign in each step, with speeds up
-to 2 mu N h/m. The error of the amplitude is of first order in h. It is larger for smaller amplitudes.
+to 2 mu N h/m. The error of the amplitude is of first order in h. This error is larger for smaller amplitudes.
 
 **tanh.** If v0 is too large, the body creeps. If v0 is too small, RK4 is unstable. A body that should stick creeps
 at the speed v0 artanh(e/(mu N)). At v = 0 the law has its largest rate, mu N/(m v0). Classic RK4 is stable if its
@@ -316,8 +318,8 @@ An adaptive method chooses its own step. The table is for `dop853` at rtol = 1e-
 
 **Karnopp's band.** The body enters the band at the speed v0. Stops are therefore too early, as with the velocity
 set to zero. If the body sticks, the limit is the same too. The events are located, so the step has almost no
-effect. On the belt the body first has to cross the band, while the friction force is at its limit. Its slip is
-therefore late, and the limit is 1.1 %.
+effect. On the belt the body first has to cross the band, while the friction force is at its limit. The slip of the
+body is therefore late, and the limit is 1.1 %.
 """
 
 

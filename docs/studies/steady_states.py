@@ -214,32 +214,34 @@ def study(count: int, seed: int, journal: Path) -> list[dict[str, Any]]:
 
 HEAD = """# Steady states against plain runs
 
-Does `hs.steady_state` find the motion that a long run reaches? Of {all} random points {agree} agree with a plain run.
-{irregular} further points have a motion that does not repeat, by both. {slow} points had not settled at the end of the
-plain run, {refused} points have no steady state by both, and the results differ at {differ}.
+Does `hs.steady_state` find the motion that a long run reaches? At {agree} of {all} random points `hs.steady_state`
+agrees with a plain run. At {irregular} further points both methods find a motion that does not repeat. {slow} points
+had not settled at the end of the plain run. At {refused} points both methods find no steady state. At {differ} the
+results differ.
 
-`python docs/studies/steady_states.py` draws the numbers of {kinds} kinds of models at random, and compares two results
-for each point. One result is that of `hs.steady_state` with at most {most} periods. The other result is that of plain
-runs (`docs/studies/steady_brute.py`), which use `hs.simulate` and nothing of `hybridsim.analysis`. They use `dop853`
-with the tolerance {rtol:g}.
+`python docs/studies/steady_states.py` draws the numbers of {kinds} kinds of models at random, and compares two
+results for each point. One result is that of `hs.steady_state` with at most {most} periods. The other result is that
+of plain runs (`docs/studies/steady_brute.py`), which use `hs.simulate` and nothing of `hybridsim.analysis`. The
+plain runs use `dop853` with the tolerance {rtol:g}.
 
 - A plain run has {short}, then {middle}, then {long} periods of the forcing, and ends earlier if the motion repeats.
-  Its states at one phase of each period are compared. The motion has the shortest period, up to {longest} periods of
+  The states at one phase of each period are compared. The motion has the shortest period, up to {longest} periods of
   the forcing, after which no state changes by more than {repeats:g} of its range. Without forcing, the states at
   upward passages of a level are compared.
 - The amplitudes are those of {samples} samples per period, with a search between the samples.
-- The multipliers are those of differences: each state at the beginning of the period is changed by {step:g} of its
-  range, upward and downward. If the two sides differ, the motion has no multipliers and they are not compared.
-- A change by {perturbed:g} of the state of a motion that does not repeat is followed over {followed} periods. The
-  motion is chaotic if the change grows by more than a factor of {grown:g}.
+- The multipliers of a plain run are computed by differences. For these differences, each state at the beginning of
+  the period is changed by {step:g} of its range, upward and downward. If the two changes give different results, the
+  motion has no multipliers.
+- If a motion does not repeat, its state is changed by {perturbed:g}. This change is followed over {followed}
+  periods. The motion is chaotic if the change grows by more than a factor of {grown:g}.
 
-The amplitudes and periods agree if they differ by at most {equal:g}, relatively. The multipliers agree if the
-coefficients of their characteristic polynomials do, within {equal_multipliers:g} of the product of 1 + s over the
-singular values s of the matrix. The fractions of time in stick are compared too. At {swept} points with a
-periodic motion `hs.sweep`, and at {responses} points `hs.frequency_response`, returned the amplitude of the plain run.
-At {scipy} points a program that uses only SciPy (`solve_ivp` with events) found the same amplitude and the same
-fraction of stick. A mechanical system is compared with its ordinary model. The multipliers of {multipliers} points
-are compared.
+The amplitudes and periods agree if they differ by at most {equal:g}, relatively. The multipliers are compared by the
+coefficients of their characteristic polynomials. These coefficients may differ by {equal_multipliers:g} of the
+product of 1 + s, over the singular values s of the matrix. The fractions of time in stick are compared too. At
+{swept} points with a periodic motion `hs.sweep`, and at {responses} points `hs.frequency_response`, returned the
+amplitude of the plain run. At {scipy} points a program that uses only SciPy (`solve_ivp` with events) found the same
+amplitude and the same fraction of stick. A mechanical system is compared with its ordinary model. The multipliers of
+{multipliers} points are compared.
 
 | kind of model | points | agree | do not repeat | had not settled | no steady state | differ |
 | --- | --- | --- | --- | --- | --- | --- |
@@ -278,8 +280,8 @@ def page(done: list[dict[str, Any]]) -> str:
     out += "".join(f"| {ours} | {theirs} | {n} |\n" for (ours, theirs), n in pairs.most_common())
     minutes = sum(sum(record["seconds"]) for record in done) / 60.0
     return out + (
-        f"\nRun `python docs/studies/steady_states.py [points] [seed] [journal]` to repeat the study. It takes "
-        f"about {minutes:.0f} minutes on one core.\n"
+        "\nRun `python docs/studies/steady_states.py [points] [seed] [journal]` to repeat the study. The "
+        f"study takes about {minutes:.0f} minutes on one core.\n"
     )
 
 

@@ -1,6 +1,7 @@
 """Compare stopped and resumed runs with undisturbed ones, and count the points that a killed sweep loses.
 
-    python docs/studies/survival.py [--moments N] [--kills N] [--seed S]      (100 and 50 make docs/studies/survival.md)
+    python docs/studies/survival.py [--moments N] [--kills N] [--seed S]      (100 and 50 make
+    docs/studies/survival.md)
 
 The runs use every integrator that is compiled or has a fixed step. The scenes have stick and slip, impacts that come
 to rest, clocks and discrete states, jumps of an input, sliding, and friction along a stop. A run is stopped at a
@@ -217,14 +218,16 @@ def entries(journal: Path) -> int:
 TEXT = """# Runs that are stopped, sweeps that are killed
 
 Does a run or a sweep survive an interruption? {verdict} A resumed sweep gives the results of an uninterrupted sweep.
-After each kill it computes at most {most} point a second time. `docs/studies/survival.py` interrupts runs and sweeps.
+After each kill the sweep computes at most {most} point a second time. The script `docs/studies/survival.py`
+interrupts runs and sweeps.
 
 ## Stopped at a random step and resumed
 
 Each run was stopped at {moments} random steps by `limits={{"steps": ...}}` and continued by `resume()`. The table
 counts the runs that stopped. Compiled code checks limits only at certain times. If a run reached its end before the
 next check, it is *done*. Resumed runs are compared bit for bit with a run that was never stopped. The comparison
-includes the times and states of all steps, the events with the states before and after, the status and the message.
+includes the times and states of all steps, the status and the message. It also includes the events, with the states
+before and after them.
 
 | integrator | {scenes} |
 | --- | {lines} |
@@ -236,8 +239,8 @@ includes the times and states of all steps, the events with the states before an
 
 A sweep of {points} points runs in a separate process, and took {seconds:.1f} s without interruption. SIGKILL ended
 the process {kills} times at random times, and each time the sweep was started again. In {begun} cases the sweep
-finished before the kill. It then started again without a journal. The process writes each point to a log file
-before it computes the point.
+finished before the kill. After such a finish the sweep started again without a journal. The process writes each
+point to a log file before it computes the point.
 
 | | |
 | --- | --- |

@@ -88,17 +88,17 @@ def page() -> str:
 
 HEAD = """# Faults of units
 
-How many faults of units does `hybridsim check` find? It finds {share:.1f} % of random faults, and names the right
-line.
+How many faults of units does `hybridsim check` find? The command finds {share:.1f} % of random faults, and names the
+right line.
 
 `python docs/studies/units.py` puts faults of units into the packaged models that declare units, one fault at a time.
-It counts how many faults `hybridsim check` finds, and on which lines. See [Check the units of a
+The script counts how many faults `hybridsim check` finds, and on which lines. See [Check the units of a
 model](../how-to/check-units.md).
 
 The faults are drawn at random. There are three kinds:
 
-- *Another unit* means that a declaration gets a unit of another dimension, or a unit of the same dimension and
-  another size.
+- *Another unit* means that a declaration gets a wrong unit. The wrong unit has another dimension, or the same
+  dimension and another size.
 - *A factor left out* means that `a*b` becomes `a` or `b`, and `a/b` becomes `a`.
 - *A name exchanged* means that a name in an expression becomes another name of the model.
 
@@ -106,13 +106,14 @@ A fault counts only if it changes the unit of an expression. A factor that is le
 and exchanged names must have different units. The script has its own table of the units of all names, which shares
 no code with the check. These changes do not count:
 
-- The changed expression is a guard, monitor or surface that is a single product. Such an expression may have any unit.
+- The changed expression is a guard, monitor or surface that is a single product. An expression that is a single
+  product may have any unit.
 - After the change, the expression is only a number. A number may have any unit.
 - Other checks refuse the changed model.
 
 A fault is found on the right line if the warning is on the line of the changed expression. For a changed
-declaration, a line of an expression with the declared name counts as right too. For a change in the law of a
-contact, the line of its load or of its arguments is right.
+declaration, a line of an expression with the declared name counts as right too. For a change in a friction law, the
+line of the contact's load or of the law's arguments is right.
 """
 REASONS = """The faults were not found for these reasons:
 

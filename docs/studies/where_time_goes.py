@@ -169,7 +169,7 @@ def page(found: dict[str, Counter[str]]) -> str:
             "",
             "Which part of the work takes the most time in a short run?",
             *(
-                f"With `{SCENES[name]}` in {name} the largest part is *{each.most_common(1)[0][0]}*, with "
+                f"With `{SCENES[name]}` in scene `{name}`, the largest part is *{each.most_common(1)[0][0]}*, with "
                 f"{100.0 * each.most_common(1)[0][1] / each.total():.1f} % of the time."
                 for name, each in found.items()
             ),

@@ -108,11 +108,11 @@ def claim_figure_4(curves: Curves) -> Claim:
     enough = _sortable(with_[closest]["latest"], np.inf) <= allowed
     also = any(_sortable(row["latest"], np.inf) <= allowed for row in without.values())
     verdict = Verdict.REPRODUCED if enough and also else Verdict.SHAPE if enough else Verdict.NOT
-    counts = ", ".join(f"{m}: {row['converged at 1200']} of {len(CASES)}" for m, row in without.items())
+    counts = ", ".join(f'"{m}": {row["converged at 1200"]} of {len(CASES)}' for m, row in without.items())
     why = (
         f"With stick, A and E have converged to 0.1 % in all {len(CASES)} cases if h0 is at least "
         f"{with_[closest]['latest']:.0f}. "
-        f'This holds for the reading "{closest}". At h0 = 1200, A is '
+        f'This result is for the reading "{closest}". At h0 = 1200, A is '
         f"within {100 * with_[closest]['largest error']:.2g} % of the exact A. Without stick, fewer cases "
         f"have converged at h0 = 1200 ({counts}). The reason is the chatter of the velocity, whose effect "
         "is of first order in the step."
@@ -143,9 +143,9 @@ def claim_figure_5(curves: Curves) -> Claim:
     literal = ours[paper.LITERAL.name]
     why = (
         f'The reading closest to the paper is "{closest}". In this reading A and E have converged in all '
-        f"{len(CASES)} cases if eps_v is at most {best['latest']:.1e}. With v kept, as in Eq. 4 of the "
-        f"paper, eps_v must be at most {literal['latest']:.1e}. With v kept and the published eps_v = "
-        f"8e-4, the error of A is up to {100 * literal['largest error']:.2g} % in these cases. At {RIDGE} "
+        f'{len(CASES)} cases if eps_v is at most {best["latest"]:.1e}. With "v kept", as in Eq. 4 of the '
+        f'paper, eps_v must be at most {literal["latest"]:.1e}. With "v kept" and the published eps_v = '
+        f"8e-4, the error of A is up to {100 * literal['largest error']:.2g} % in the 10 cases. At {RIDGE} "
         f"the error of A is {100 * literal['error on the ridge']:.2g} %. The maps of Figures 10 and 11 use "
         "eps_v = 8e-4."
     )

@@ -165,12 +165,12 @@ def claim(found: Maps, quantity: str, study: StepStudy) -> Claim:
     end = best["above 10 %"] or {"F0/N": math.nan, "r": math.nan}
     truly = readings[pair_name((closest.split("; ")[0], EXACT))]
     why = (
-        f"Our map also has a ridge, along which {quantity}_D is large. The reading closest to the paper "
-        f"has {described(closest)}. In this reading the maximum of {quantity}_D is "
+        f"Our map also has a ridge, along which {quantity}_D is large. In the pair of readings closest to "
+        f"the paper, the method without stick has {described(closest)}. With this pair the maximum of {quantity}_D is "
         f"{_percent(best['maximum'])} at F0/N = {best['at'][0]:g}, r = {best['at'][1]:g}. Along the ridge "
         f"{quantity}_D stays above 10 % up to F0/N = {end['F0/N']:g}, r = {end['r']:g}. "
         f"{study.sentence(quantity)} Near the threshold of motion, at F0/N = {found.ratios[0]:g}, the "
-        f"median of {quantity}_D over r is {_percent(best['near the threshold'])} in this reading. The "
+        f"median of {quantity}_D over r is {_percent(best['near the threshold'])} with this pair. The "
         f"median is {_percent(truly['near the threshold'])} if {quantity}2 is the value of the exact "
         f"motion. In the paper {quantity}_D decreases towards the threshold."
     )

@@ -35,8 +35,8 @@ _CAPTIONS = {
     "figure 6": "The left panel shows the increase of the run time. The right panel shows the increase of "
     "the number of evaluations of the right-hand side.",
     "figure 7": "The grey mark shows the claimed increase of 225 %.",
-    "figure 10": "In the first two columns A2 is computed by the published method, with the velocity in "
-    "stick kept or set to zero. In the last column A2 is exact.",
+    "figure 10": "In the first two columns, A2 is computed by the published method. "
+    "The velocity in stick is kept or set to zero. In the last column A2 is exact.",
     "figure 11": "The maps correspond to those of Figure 10, with E_D in place of A_D.",
     "figure 12": (
         "Without stick the friction force jumps between its limits. If the velocity is kept in "
@@ -78,18 +78,19 @@ def _head(study: Study, claims: tuple[Claim, ...]) -> str:
     return f"""\
 # He et al. 2026, claim by claim
 
-When must a model include stick-slip? The paper of He et al. answers this question by a map, but the values of the
-map depend on the size of the step. The paper is {SOURCE}. The map shows the deviation between a method without
-stick and a method with stick. For small steps, the motion that is computed without stick approaches the motion with
-stick. The values of the map therefore decrease with the step. In the paper the motion, its spectrum, and the
-reduction to two parameters are right. The run times in the paper are those of one implementation.
+When must a model include stick-slip? The paper of He et al. answers this question by a map, but the values of this
+map depend on the size of the step. The paper is {SOURCE}. The map shows the deviation between a method without stick
+and a method with stick. For small steps, the motion that is computed without stick approaches the motion with stick.
+The values of the map therefore decrease with the step. The motion, its spectrum, and the reduction to two parameters
+are right in the paper. The run times in the paper are those of one implementation.
 
 The system is an oscillator with Coulomb friction and harmonic forcing (model `dfcs`). This study computes every
 figure of the paper again. The integrator `rk4-dichotomy` is our implementation of the published method with
 stick-slip. The integrator `rk4-sign` is our implementation of the method without stick-slip. The paper leaves
 details of the methods open. A *reading* is one choice of these details. The study compares the results of the
 readings with the exact motion, which `exact` computes. The sections after the claims give results that do not
-depend on a step. They show which motions stop, for how long, and how large the errors of models without stops are.
+depend on a step. These sections show which motions stop, and for how long. They also show the errors of models
+without stops.
 
 | figure | claim | verdict |
 | --- | --- | --- |
@@ -105,8 +106,8 @@ way. The paper leaves these details of the methods open:
 - *v kept* or *v zero*: in stick the velocity of the body is kept, or set to zero.
 - *release step* or *located*: the release is at the next step, or at the instant at which the applied force reaches
   the limit of friction.
-- *force by step* or *by stage*: the direction of friction is chosen once per step, or at each stage of RK4. For A1
-  these choices are called *sign by step* and *sign by stage*.
+- *force by step* or *by stage*: the direction of friction is chosen once per step, or at each stage of RK4. For the
+  method without stick, these two choices are called *sign by step* and *sign by stage*.
 - *full-step* or *rest-of-step*: the step after an event has the full length, or only completes the interrupted
   step.
 
@@ -176,10 +177,10 @@ def _truth(study: Study, image: Callable[[str], str]) -> str:
             "",
             f"![stick fraction, stops per period, amplitude]({image('stick')})",
             "",
-            "The amplitude of each simpler model is within 1 % of the exact amplitude at this share of "
-            "the points at which the body moves: "
+            "At some of the points at which the body moves, the amplitude of a simpler model is within 1 % of the "
+            "exact amplitude. The share of these points is: "
             + ", ".join(f"{name} {_percent(share)}" for name, share in within.items())
-            + ". Den Hartog's closed form needs no simulation. Its error is below 1 % if less than "
+            + ". Den Hartog's closed form needs no simulation. The error of this form is below 1 % if less than "
             + _percent(facts["stick fraction below which the closed form without stops is within 1 %"])
             + " of the period is stick, and below 5 % if less than "
             + _percent(facts["stick fraction below which the closed form without stops is within 5 %"])

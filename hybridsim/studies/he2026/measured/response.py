@@ -117,8 +117,8 @@ def claim_figure_3(runs: dict[str, Response]) -> Claim:
         "figure 3",
         "3",
         (
-            "the motion has the period of the forcing and only odd harmonics of omega, and its high harmonics "
-            "are significant"
+            "the motion has the period of the forcing, and its high harmonics are significant. The claimed "
+            "harmonics are odd harmonics of omega only"
         ),
         {"period": "T", "harmonics": "odd", "high harmonics": "significant"},
         ours,
@@ -156,18 +156,19 @@ def claim_figure_12(runs: dict[str, Response], study: StepStudy) -> Claim:
     by_step, by_stage = (f"from {100 * row[first]:.2g} % to {100 * row[-1]:.2g} %" for row in falls.values())
     why = (
         f"Without stick the friction force jumps between its limits up to {chatter:.0f} times per period. "
-        f"In the exact motion the body sticks for {100 * runs[EXACT].stick:.0f} % of the period. The "
-        f"reading closest to the paper has {paper.described(closest)}. In this reading A_D is "
+        f"In the exact motion the body sticks for {100 * runs[EXACT].stick:.0f} % of the period. In the "
+        "pair of readings closest to the paper, the method without stick has "
+        f"{paper.described(closest)}. With this pair A_D is "
         f"{100 * ours[closest]['A_D']:.1f} %. The method without stick deviates from the exact motion. If "
-        f"h0 increases from {paper.STEPS_PER_PERIOD} to {STEPS[-1]}, this deviation decreases. With sign by "
-        f"step it decreases {by_step}, and with sign by stage {by_stage}."
+        f"h0 increases from {paper.STEPS_PER_PERIOD} to {STEPS[-1]}, this deviation decreases. With "
+        f'"sign by step" the deviation decreases {by_step}. With "sign by stage" it decreases {by_stage}.'
     )
     return Claim(
         "figure 12",
         "12",
         (
-            "A_D is 15 % at F0/N = 0.54, r = 0.55, and the friction force without stick jumps between its "
-            "limits around v = 0"
+            "A_D is 15 % at F0/N = 0.54, r = 0.55. Without stick, the claimed friction force jumps between "
+            "its limits around v = 0"
         ),
         {"A_D": 0.15},
         ours,
@@ -196,8 +197,8 @@ def claim_figure_13(runs: dict[str, Response], figure_12: dict[str, Response]) -
         "figure 13",
         "13",
         (
-            "A_D is 2 % at F0/N = 0.80, r = 1.0, which is less than in figure 12 because the body sticks for "
-            "less time"
+            "A_D is 2 % at F0/N = 0.80, r = 1.0. The claimed value is smaller than in figure 12 because the "
+            "body sticks for less time"
         ),
         {"A_D": 0.02},
         ours,

@@ -128,7 +128,7 @@ def claim_figure_6(times: RunTimes) -> Claim:
     return Claim(
         "figure 6",
         "6",
-        "the run time increases fast if eps_v decreases, by more than 120 % at eps_v = 1e-7, and this "
+        "the run time increases fast if eps_v decreases, by more than 120 % at eps_v = 1e-7. The claimed "
         "increase hardly depends on r, N and F0",
         {"t_d at 1e-7": 1.20},
         ours,

@@ -90,7 +90,7 @@ SIGNS = tuple(
 def described(pair: str) -> str:
     """Return a description of a pair of methods, one without stick and one with stick."""
     without, _, with_ = pair.partition("; ")
-    return f'"{without}" without stick, and "{with_}" with stick'
+    return f'"{without}". The method with stick has "{with_}"'
 
 
 @dataclass(frozen=True)

@@ -54,7 +54,8 @@ class StepStudy:
         return np.asarray(np.sqrt((self.by_eps[method][quantity] ** 2).mean(axis=0)))
 
     def shrinks(self, quantity: str) -> bool:
-        """Return whether the deviation along the ridge of the map decreases with the step, for every interpretation."""
+        """Return whether the deviation along the ridge of the map decreases with the step, for every
+        interpretation."""
         first = STEPS.index(STEPS_PER_PERIOD)
         return all(
             self.along(v.name, quantity)[-1] < _SHRINKS * self.along(v.name, quantity)[first] for v in SIGNS
@@ -67,8 +68,8 @@ class StepStudy:
         by_step, by_stage = (f"from {100 * a[first]:.2g} % to {100 * a[-1]:.2g} %" for a in values)
         return (
             "On the ridge the method without stick deviates from the exact motion. If h0 increases from "
-            f"{STEPS_PER_PERIOD} to {STEPS[-1]}, this deviation decreases. With sign by step it decreases "
-            f"{by_step}, and with sign by stage {by_stage}."
+            f"{STEPS_PER_PERIOD} to {STEPS[-1]}, this deviation decreases. "
+            f'With "sign by step" the deviation decreases {by_step}. With "sign by stage" it decreases {by_stage}.'
         )
 
     def to_plain(self, quantity: str) -> dict[str, Any]:

@@ -47,8 +47,8 @@ def claim(maps: Maps, study: StepStudy, truth: Truth) -> Claim:
     return Claim(
         "text",
         "",
-        "the deviation depends on the stick fraction, which is the share of the period in stick, and "
-        "stick-slip need not be considered if this fraction is small",
+        "the deviation depends on the stick fraction, which is the share of the period in stick. If this "
+        "fraction is small, stick-slip need not be considered",
         {"deviation": "grows with the share of the period in stick"},
         ours,
         closest,
