@@ -20,16 +20,16 @@ _INTRODUCTION = """\
 
 {answer}
 
-A scene is a model with a known answer. The answer is a closed form, or a number with at least 30 digits. A program
-that shares no code with the package computed these digits. The command `hybridsim atlas` runs all scenes with all
-methods.
+A scene is a model with a known answer. The answer is a closed form, or a number with at least 30 digits. The digits
+were computed by a program that shares no code with the package. The command `hybridsim atlas` runs all scenes with
+all methods.
 
 ![scenes against integrators, a verdict for each pair](matrix.png)
 
 A method is *right* in a scene if it satisfies four conditions:
 
-- It finds every event, in the right mode and order.
-- It reports no other events.
+- The method finds every event, in the right mode and order.
+- The method reports no other events.
 - States that are constant in stick are exact at every setting of the method.
 - At the tightest setting the errors are within the scene's tolerance.
 
@@ -50,10 +50,10 @@ least 4.2e-4 units, the length of two steps of unit/4800. In scenes longer than 
 rtol 100 times as large.
 
 In the tables of the scenes, a number follows the name of a method. This number is the larger of two errors at the
-last setting in the table above. One is the error of event times, in units of the scene. The other is the error of
-states, relative to their largest true value. If the error decreases with the step, the table also has the observed
-order of convergence. Each integrator states in `lacks` the features that it does not support. The atlas also runs
-scenes that need such a feature. In these scenes the missing feature is the reason of a failure or refusal.
+last setting in the table above. The first error is that of event times, in units of the scene. The second error is
+that of states, relative to their largest true value. If the error decreases with the step, the table also has the
+observed order of convergence. Each integrator states in `lacks` the features that it does not support. The atlas
+also runs scenes that need such a feature. In these scenes the missing feature is the reason of a failure or refusal.
 
 Most methods use the event location and the mode selection of the engine. The exceptions are the fixed-step methods, and
 methods with native events, a cooldown or regularized friction. If all methods are right in a scene, the text of the
@@ -74,10 +74,10 @@ output, which differs from this state by rounding. It then finds no change of si
 solver fails before it searches for the event. |
 
 The picture of a scene shows one state in a time window around the first visible error of a method. The solid line is a
-correct run. The dashed line is a run of the failing method. The legend names this method, and the table of the scene
-names its setting. The strip below the curves shows the events of both runs in this window. The number of events of
-each run is at the right edge of the strip. Circles are known exact values. If the error is below 4 % of the range of
-the state in this window, a second panel shows the error.
+correct run. The dashed line is a run of the failing method. The legend names the failing method, and the table of
+the scene names its setting. The strip below the curves shows the events of both runs in this window. The number of
+events of each run is at the right edge of the strip. Circles are known exact values. If the error is below 4 % of
+the range of the state in this window, a second panel shows the error.
 """
 _QUESTIONS = {
     "events": "Does a method find each event once, at the right time and in the right order?",
