@@ -8,6 +8,7 @@ import numpy as np
 
 from hybridsim.analysis.extrapolation.settling import Settling
 from hybridsim.analysis.steady.motion import Motion, Point, point_at_end
+from hybridsim.analysis.steady.on_guard import slight_slip
 from hybridsim.analysis.steady.settling import RESTS, Passings, forced_scale_of
 from hybridsim.analysis.steady.shooting import Orbit
 from hybridsim.analysis.variations.sizes import ranges
@@ -80,6 +81,10 @@ class ModelPeriods:
         self.motion.sizes = np.maximum(np.abs(low), np.abs(high))
         scale = forced_scale_of(solution, solution.t_start)
         return scale, bool((high - low <= RESTS * self.motion.sizes).all())
+
+    def slight_slip(self, periods: int, scale: np.ndarray, most: float) -> str:
+        """Return a contact that slips slightly over the next periods, or ""; see `has_slight_slip`."""
+        return slight_slip(self.motion.run(self.point, periods * self.period), scale, most)
 
 
 def _sequence(modes: np.ndarray) -> np.ndarray:

@@ -43,3 +43,9 @@ class PeriodMap(Protocol):
 
     def measure(self) -> tuple[np.ndarray, bool]:
         """Follow the motion for one period, and return the scale (n,) of each state and whether nothing moves."""
+
+    def slight_slip(self, periods: int, scale: np.ndarray, most: float) -> str:
+        """Return a contact that slips slightly over the next periods, or ""; see `has_slight_slip`.
+
+        The map must be restored afterwards.
+        """

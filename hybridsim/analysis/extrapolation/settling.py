@@ -10,11 +10,14 @@ A contact that slips less in each period, until its force only just reaches the 
 twice as far in the direction of the change.
 
 The motion has settled if plain periods approach a limit within the tolerance, or if their change is within the
-tolerance and no extrapolation reduces it. If the motion was extrapolated, `growth` decides whether it attracts.
+tolerance and no extrapolation reduces it. If the motion was extrapolated, two further conditions hold. The plain
+periods must approach it from the states before the first extrapolation; the numbers for this are those of `nearness`.
+A small change must not grow, as `growth` decides. Otherwise the plain periods continue.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -23,8 +26,10 @@ import numpy as np
 from hybridsim.analysis.extrapolation.growth import grows
 from hybridsim.analysis.extrapolation.limit import limit_of
 from hybridsim.analysis.extrapolation.period_map import PeriodMap
+from hybridsim.analysis.steady.approach import followed, is_near
 from hybridsim.analysis.steady.motion import Point
 from hybridsim.analysis.steady.settling import Passings, relative
+from hybridsim.ensemble.nearness import CLOSE, LINEAR
 from hybridsim.errors import SimulationError
 
 _EVERY = 4  # periods between tests
@@ -36,6 +41,7 @@ _NEAR = 1.0  # the same if contacts slip after the extrapolation that did not sl
 _CLOSER = 0.5  # an extrapolation that does not reduce the change by this factor is taken back
 _SQUARED = (0.1, 0.5)  # reduction of the change by an extrapolation that covers about half of the distance
 _TWICE = 0.9  # additional length of the next extrapolation, which must not go beyond the limit
+_HALF = 0.5  # of the distance remains then after an extrapolation; it is a third for an exact square
 _NEARLY = 1e4  # multiple of the tolerance: below it, the motion may be about to repeat
 
 
@@ -82,6 +88,7 @@ class Settling:
         self.extrapolations = 0
         self._may_extrapolate = True
         self._trial: _Trial | None = None
+        self._plain: Any = None  # snapshot at the end of the plain periods, before any extrapolation
         self._is_squared = False  # whether the change falls with the square of the distance
         self._beyond = 0.0  # additional length of the next extrapolation
         self._wait = self._waited = 0  # periods until the next extrapolation, and since the last one
@@ -109,7 +116,7 @@ class Settling:
             if not self._end_trial(passings.scale):
                 continue
             multiple = 1 if rests else self._multiple(passings)
-            if multiple is not None and self._attracts(passings, multiple):
+            if multiple is not None and self._is_reached(passings, multiple):
                 return Settled(passings, multiple, rests, self.extrapolations)
             if self.map.periods >= self.max_periods:
                 return Settled(passings, None, False, self.extrapolations)
@@ -163,6 +170,8 @@ class Settling:
         self._trial = _Trial(
             self.map.snapshot(), self._states, self._pairs, self._fresh, self.map.slips, self._events, is_near
         )
+        if self._plain is None:
+            self._plain = self._trial.former
         self.map.put(limit)
         self._states, self._fresh = [limit], 0
 
@@ -186,17 +195,58 @@ class Settling:
     def _take_back(self, trial: _Trial) -> None:
         """Return to the states before an extrapolation that failed."""
         self._trial = None
+        if self._plain is trial.former:
+            self._plain = None
         self.map.restore(trial.former)
         self._states, self._pairs, self._fresh = trial.states, trial.pairs, trial.fresh
         self._events = trial.events
         self._beyond, self._is_exhausted = 0.0, True
         self._wait, self._waited = max(_EVERY, self._fresh // 2), 0
 
-    def _attracts(self, passings: Passings, multiple: int) -> bool:
-        """Return whether a disturbance in the slowest direction decays; if it grows, keep the disturbed motion."""
+    def _is_reached(self, passings: Passings, multiple: int) -> bool:
+        """Return whether plain periods approach a repeating motion that attracts; otherwise make them continue."""
         if not (self.extrapolations and self._may_extrapolate):
             return True
-        if not grows(self.map, passings.scale, multiple, self._slowest):
+        distance = 0.0 if self._plain is None else self._follow_plain(passings.scale, multiple)
+        if distance < math.inf and not grows(self.map, passings.scale, multiple, self._slowest):
             return True
-        self._may_extrapolate, self._states = False, [self.map.x]
+        if distance > CLOSE:
+            self.map.restore(self._plain)
+        else:
+            self._may_extrapolate = False  # the map goes on from the changed states
+        self._plain, self._states, self._pairs, self._fresh, self._events = None, [self.map.x], [], 0, b""
+        self._wait, self._waited, self._is_exhausted = self.map.periods, 0, False
         return False
+
+    def _follow_plain(self, scale: np.ndarray, multiple: int) -> float:
+        """Return the distance of the plain periods from the present motion at their end, or infinity without approach.
+
+        They continue from the states before the first extrapolation. The map returns to its present states.
+        """
+        orbit = []
+        for _ in range(multiple):
+            self.map.advance()
+            orbit.append((self.map.changes, self.map.x))
+        present = self.map.snapshot()
+        self.map.restore(self._plain)
+        states = [self.map.x]
+
+        def distance(x: np.ndarray) -> float:
+            return min(relative(x - y, scale) for _, y in orbit)
+
+        def step() -> float | None:
+            self.map.advance()
+            states.append(self.map.x)
+            return distance(self.map.x) if any(self.map.changes == word for word, _ in orbit) else None
+
+        distances = followed(step, distance(self.map.x))
+        self._plain = self.map.snapshot()
+        self.map.restore(present)
+        if not distances:
+            return math.inf
+        if is_near(distances):
+            return distances[-1]
+        repeated = np.array(states[(len(states) - 1) % multiple :: multiple])
+        limit, _ = limit_of(repeated[:-1], repeated[1:], scale)
+        left = _HALF if self._is_squared else LINEAR
+        return distances[-1] if distance(limit) <= left * distances[-1] else math.inf

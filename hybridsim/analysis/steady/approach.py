@@ -7,6 +7,7 @@ same in compiled code.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -32,8 +33,25 @@ def is_approached(motion: Motion, last: Point, orbit: Orbit, scale: np.ndarray, 
     """
     around = motion.run(orbit.start, orbit.period)
     rates = rates_at_end(around) if section is not None else np.zeros(0)
-    points, distances = _followed(motion, last, orbit, scale, rates, _word(around))
-    if not distances or _is_near(distances):
+    word, point, length = _word(around), last, orbit.period
+    points = [last.values]
+
+    def step() -> float | None:
+        nonlocal point, length
+        try:
+            solution = motion.run(point, length)
+        except SimulationError:
+            return None
+        if _word(solution) != word:
+            return None
+        point = replace(point_at_end(solution), at=point.at)
+        away, late = across(point.values - orbit.start.values, rates, scale)
+        length = orbit.period - late
+        points.append(point.values)
+        return relative(away, scale)
+
+    distances = followed(step, relative(last.values - orbit.start.values, scale))
+    if not distances or is_near(distances):
         return bool(distances)
     motion.carry(around)
     before, after = points[-2:]
@@ -42,32 +60,28 @@ def is_approached(motion: Motion, last: Point, orbit: Orbit, scale: np.ndarray, 
     return relative(left, scale) <= LINEAR * distances[-1]
 
 
-def _is_near(distances: list[float]) -> bool:
-    return distances[-1] <= max(NEARER * distances[0], CLOSE)
+def followed(step: Callable[[], float | None], first: float) -> list[float]:
+    """Return the distances of a run from an orbit at repeated periods, until they are near it.
 
+    They are empty if a sequence of events is not that of the orbit.
 
-def _followed(
-    motion: Motion, last: Point, orbit: Orbit, scale: np.ndarray, rates: np.ndarray, word: Word
-) -> tuple[list[np.ndarray], list[float]]:
-    """Return the values at repeated periods of the orbit until they are near it, and their distances from it.
-
-    They are empty if a sequence of events differs from `word`.
+    Parameters
+    ----------
+    step : follows the run for one period of the orbit; returns the distance, or None if the events differ.
+    first : the distance at the start.
     """
-    point, length = last, orbit.period
-    points, distances = [last.values], [relative(last.values - orbit.start.values, scale)]
-    while len(points) <= MOST and (len(points) == 1 or not _is_near(distances)):
-        try:
-            solution = motion.run(point, length)
-        except SimulationError:
-            return [], []
-        if _word(solution) != word:
-            return [], []
-        point = replace(point_at_end(solution), at=point.at)
-        away, late = across(point.values - orbit.start.values, rates, scale)
-        length = orbit.period - late
-        points.append(point.values)
-        distances.append(relative(away, scale))
-    return points, distances
+    distances = [first]
+    while len(distances) <= MOST and (len(distances) == 1 or not is_near(distances)):
+        distance = step()
+        if distance is None:
+            return []
+        distances.append(distance)
+    return distances
+
+
+def is_near(distances: list[float]) -> bool:
+    """Return whether the last distance from an orbit is small, absolutely or relative to the first one."""
+    return distances[-1] <= max(NEARER * distances[0], CLOSE)
 
 
 def _word(solution: Solution) -> Word:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from hybridsim.analysis.extrapolation.slight_slips import has_slight_slip
 from hybridsim.engine.record.segments import Segment
 from hybridsim.solution import Solution
 
@@ -38,28 +39,28 @@ def lies_on_a_guard(solution: Solution, scale: np.ndarray) -> bool:
 
 
 def slight_slip(solution: Solution, scale: np.ndarray, most: float) -> str:
-    """Return the contact that slips between two phases of stick by less than a part of the size of its velocity, or "".
+    """Return a contact that has a slight slip over one period of a motion, or ""; see `has_slight_slip`.
 
     scale (n + d,): size of each state and discrete state of the motion.
     """
     system = solution._system
     chosen = np.flatnonzero(scale[: system.n] > 0.0)
+    segments = [segment for segment in solution._segments if segment.s[-1] != segment.s[0]]
     for c in system.surface_of:
-        largest, has_slipped, hold = np.inf, False, system.automata[c].hold
-        for segment in solution._segments:
-            if segment.z[c] == hold:
-                if has_slipped and largest <= most:
-                    return str(system.automata[c].name)
-                largest, has_slipped = 0.0, False  # the next slip begins from stick
-                continue
-            has_slipped = True
-            if largest > most:
-                continue
+        sticks = np.array([segment.z[c] == system.automata[c].hold for segment in segments])
+        largest = np.zeros(len(segments))
+        for k in np.flatnonzero(~sticks):
+            segment = segments[k]
             own = system.active(segment.z) & (system.owner == c)
-            for s, x in zip(segment.s, segment.x, strict=True):
+            middles = 0.5 * (segment.s[:-1] + segment.s[1:])  # a slip begins and ends with the velocity zero
+            for s, x in zip(middles, segment.dense(middles), strict=True):
                 values, size = _values_and_sizes(solution, segment, float(s), x, chosen, scale)
                 ratio = np.abs(values[own]) / np.where(size[own] > 0.0, size[own], np.nan)
-                largest = max(largest, float(np.nan_to_num(ratio, nan=np.inf).min(initial=np.inf)))
+                largest[k] = max(largest[k], np.nan_to_num(ratio, nan=np.inf).min(initial=np.inf))
+                if largest[k] > most:
+                    break
+        if has_slight_slip(sticks, largest, most):
+            return str(system.automata[c].name)
     return ""
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from hybridsim.analysis.steady.motion import Motion, Point, point_at_end
 from hybridsim.analysis.steady.on_guard import lies_on_a_guard
-from hybridsim.analysis.steady.settling import Passings, relative
+from hybridsim.analysis.steady.settling import relative
 from hybridsim.analysis.variations.off_zero import rates_of
 from hybridsim.analysis.variations.sensitivities import derivatives
 from hybridsim.arguments import SMALLEST_RTOL
@@ -21,8 +21,6 @@ _ROUNDING = 1e-14  # relative to the states' scale; no step makes the residual s
 # An orbit with a larger multiplier is not reached by waiting: it repels, or is one of a family.
 _ATTRACTS = 1.0 - 1e-6
 _DOUBLE = 1e-3  # distance of two multipliers from 1; closer ones are separated by the direction of the motion
-_CLOSE = 1e-2  # of the scale: the motion settles on a stable orbit that is so close
-_CLOSER = 0.9  # ratio of the distances in the last and the first quarter of the passages
 
 
 @dataclass(frozen=True)
@@ -92,15 +90,6 @@ def shoot(
         if not orbit.period > 0.0:
             break
     return replace(best, converged=False)
-
-
-def is_nearing(orbit: Orbit, passings: Passings) -> bool:
-    """Return whether the last passages are closer to an orbit than the first ones, or close to it."""
-    moves = passings.scale > 0.0
-    away = passings.values[:: -orbit.multiple, moves] - orbit.start.values[moves]
-    distances = np.abs(away / passings.scale[moves]).max(axis=1, initial=0.0)  # the latest first
-    quarter = max(len(distances) // 4, 1)
-    return bool(distances[0] <= _CLOSE or distances[:quarter].mean() < _CLOSER * distances[-quarter:].mean())
 
 
 def followed_closely(motion: Motion, start: Orbit, scale: np.ndarray, is_free: bool) -> Orbit:

@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 
 from hybridsim import arguments
+from hybridsim.analysis.extrapolation import slight_slips
+from hybridsim.analysis.extrapolation.model_periods import ModelPeriods, extrapolated
 from hybridsim.analysis.keyword_options import refuse_unknown
 from hybridsim.analysis.steady.approach import is_approached
 from hybridsim.analysis.steady.irregular.incommensurate import follow
@@ -36,8 +38,8 @@ from hybridsim.analysis.steady.settling import (
     free_passings,
     is_rest,
 )
-from hybridsim.analysis.steady.shooting import Orbit, followed_closely, is_nearing, shoot
-from hybridsim.analysis.steady.shortest_period import after_slight_slips, with_shortest_period
+from hybridsim.analysis.steady.shooting import Orbit, followed_closely, shoot
+from hybridsim.analysis.steady.shortest_period import with_shortest_period
 from hybridsim.analysis.steady.together import (
     EQUILIBRIUM,
     PERIODIC,
@@ -335,12 +337,9 @@ class _Search:
         self.expected = 0
         shot = self._shot(passings, multiple)
         if shot is None and self.period is not None and self.periods >= self._next_extrapolation:
-            from hybridsim.analysis.extrapolation.model_periods import extrapolated
-
             self._next_extrapolation = 2 * self.periods
             most = min(self.periods, _MAX_PERIODS_PER_RUN)
-            shot = extrapolated(self.motion, passings, self.period, self.tol, most)
-            return shot if shot is None or is_nearing(shot, passings) else None
+            return extrapolated(self.motion, passings, self.period, self.tol, most)
         return shot
 
     def _shot(self, passings: Passings, multiple: int) -> Orbit | None:
@@ -365,12 +364,12 @@ class _Search:
         steps = orbit.steps
         orbit = with_shortest_period(self.motion, orbit, self.scale, self.period is not None, self.tol)
         self.newton_steps += orbit.steps - steps
-        orbit, slight = after_slight_slips(self.motion, orbit, self.scale, self.tol)
+        repeated = ModelPeriods(self.motion, orbit.start, orbit.period)
+        residual, slight = slight_slips.after_slight_slips(repeated, 1, orbit.residual, self.scale, self.tol)
+        orbit = replace(orbit, start=repeated.point, residual=residual)
         rests = is_rest(self.motion, orbit.start, orbit.period, self.largest, self.periods)
         kind = EQUILIBRIUM if rests else PERIODIC
-        message = message_of(kind, orbit, self.period is not None)
-        if slight:
-            message += f"; contact {slight} slips by less than the tolerance, and may stick in the limit"
+        message = message_of(kind, orbit, self.period is not None) + slight_slips.message_of(slight)
         return _found(self.motion, kind, orbit, self.period is None, self.newton_steps, self.periods, message)
 
     def _other(self, passings: Passings) -> SteadyState:

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from hybridsim.analysis.structures.scales import FLOOR, masses_of, natural_sizes, with_floor
+from hybridsim.analysis.structures.slight_slips import slight_slip
 from hybridsim.engine.system.period import common_multiple
 from hybridsim.errors import SimulationError, UsageError
 from hybridsim.mechanics.codes import DONE
@@ -128,6 +129,12 @@ class PeriodMap:
         half, largest = 0.5 * np.ptp(states, axis=0), np.maximum(largest, self.natural)
         rests = half <= _RESTS * with_floor(largest, self.masses, 1.0)
         return with_floor(np.maximum(half, FLOOR * largest), self.masses), bool(rests.all())
+
+    def slight_slip(self, periods: int, scale: np.ndarray, most: float) -> str:
+        """Return a contact that slips slightly over the next periods, or ""; see `has_slight_slip`."""
+        run = self.recorded(periods, 0.0)
+        self._run.is_recorded = False
+        return slight_slip(run, scale, most)
 
     def recorded(self, periods: int, offset: float) -> SeriesTrajectory:
         """Record the motion over some periods from the time `offset` on; the map cannot be used afterwards."""

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from hybridsim import arguments
+from hybridsim.analysis.extrapolation import slight_slips
 from hybridsim.analysis.extrapolation.settling import Settled, Settling
 from hybridsim.analysis.steady.period_argument import require_multiple
 from hybridsim.analysis.steady.quiet import middle_of_longest
@@ -51,10 +52,10 @@ def steady_state_of_structure(
     start = start_of(system, x0)
     announce_compilation()
     period_map = PeriodMap(system, base, start, arguments.relative_tolerance(rtol))
-    return _result(period_map, Settling(period_map, *effort).run(progress))
+    return _result(period_map, Settling(period_map, *effort).run(progress), effort.tol)
 
 
-def _result(period_map: PeriodMap, settled: Settled) -> StructureSteadyState:
+def _result(period_map: PeriodMap, settled: Settled, tol: float) -> StructureSteadyState:
     passings, multiple, followed = settled.passings, settled.multiple or 1, period_map.periods
     residual = passings.residual(multiple)
     if settled.rests:
@@ -62,7 +63,10 @@ def _result(period_map: PeriodMap, settled: Settled) -> StructureSteadyState:
     elif settled.multiple is not None:
         kind = "periodic"
         of = f" of {multiple} periods of the forcing" if multiple > 1 else ""
-        message = f"periodic motion{of}; residual {residual:.1e}"
+        residual, slight = slight_slips.after_slight_slips(
+            period_map, multiple, residual, passings.scale, tol
+        )
+        message = f"periodic motion{of}; residual {residual:.1e}{slight_slips.message_of(slight)}"
     else:
         kind = "not settled"
         message = (
