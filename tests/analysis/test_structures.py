@@ -175,6 +175,40 @@ def test_contacts_that_hardly_slip_settle_in_the_ordinary_model_too(seed: int) -
         assert abs(one.amplitude[name] - other.amplitude[name]) <= 1e-8 * size
 
 
+@pytest.mark.parametrize(("seed", "stuck"), [(245, "f1"), (307, "f2")])
+def test_a_slip_that_is_one_step_long_is_not_slight(seed: int, stuck: str) -> None:
+    """The velocity of such a slip is zero at both ends of the step. All contacts but one really slip."""
+    system = marginal(seed)
+    for model in (system, system.to_model()):
+        found = hs.steady_state(model)
+        assert found.kind == "periodic" and "slips by less" not in found.message
+        assert [name for name, part in found.stick_fraction.items() if part == 1.0] == [stuck]
+        assert found.amplitude["q1"] > 1e-3
+
+
+@pytest.mark.parametrize("tol", [1e-8, 1e-10, 1e-12])
+def test_a_contact_of_a_structure_whose_slips_vanish_sticks(tol: float) -> None:
+    """The force of contact g reaches its limit once in a period. A plain run ends with stick."""
+    law = {"mu_s": 0.8146, "mu_k": 0.4888, "v_s": 0.2}
+    system = hs.MechanicalSystem(
+        [1.0, 0.3742],
+        [0.1319, 0.1319],
+        [[3.021, -2.021], [-2.021, 2.321]],
+        [hs.Harmonic(0.2625, sin=0.8041), 0.0],
+        [
+            hs.MechanicalContact("f", {0: 1.0}, 0.7988, "stribeck", law),
+            hs.MechanicalContact("g", {1: 1.0}, 0.6414, "stribeck", law),
+        ],
+        q0=[-1.725, 0.0],
+    )
+    period = 2.0 * math.pi / 0.2625
+    plain = hs.simulate(system.to_model(), (0, 100 * period), integrator="dop853", rtol=1e-11)
+    assert abs(plain(100 * period)[2] - plain(40 * period)[2]) < 1e-12
+    found = hs.steady_state(system, tol=tol)
+    assert found.kind == "periodic" and "slips by less" not in found.message
+    assert found.stick_fraction["g"] == 1.0
+
+
 @pytest.mark.parametrize("unit", [1.0, 1e-9, 1e9])
 @pytest.mark.parametrize(
     ("direction", "constant"), [({0: -1.0, 1: 1.0}, 0.2), ({0: -1.0, 1: 1.0}, 0.0), ({1: 1.0}, 0.2)]
@@ -395,6 +429,25 @@ class _Bounded(_Logistic):
 def test_an_extrapolation_from_which_no_motion_is_possible_is_taken_back() -> None:
     """The plain map goes to 0."""
     settled = Settling(_Bounded(0.0, 1.0), 1e-10, 8, 4096).run(None)
+    assert settled.multiple == 1
+    assert settled.passings.values[-1] == pytest.approx([0.0, 0.0], abs=1e-9)
+
+
+class _TwoLimits(_Logistic):
+    """A map x -> 0.95 x - 0.05 above 0.1, which seems to lead to -1. Plain runs end at 0; -1 is stable too."""
+
+    def advance(self) -> np.ndarray:
+        x = float(self.x[0])
+        nearer = 0.95 * x - 0.05 if x > 0.1 else 0.5 * x if x > -0.5 else 0.5 * x - 0.5
+        self.x = np.array([nearer, 0.9 * self.x[1]])
+        self.periods += 1
+        return self.x
+
+
+@pytest.mark.parametrize("settle", [1, 8, 32])
+def test_a_stable_motion_that_plain_periods_do_not_approach_is_not_returned(settle: int) -> None:
+    """An extrapolation from the first periods is exactly on the other stable fixed point."""
+    settled = Settling(_TwoLimits(0.0, 1.0), 1e-10, settle, 4096).run(None)
     assert settled.multiple == 1
     assert settled.passings.values[-1] == pytest.approx([0.0, 0.0], abs=1e-9)
 

@@ -235,12 +235,15 @@ class Settling:
             return min(relative(x - y, scale) for _, y in orbit)
 
         def step() -> float | None:
-            self.map.advance()
+            try:
+                self.map.advance()
+            except SimulationError:
+                return None
+            self._plain = self.map.snapshot()
             states.append(self.map.x)
             return distance(self.map.x) if any(self.map.changes == word for word, _ in orbit) else None
 
         distances = followed(step, distance(self.map.x))
-        self._plain = self.map.snapshot()
         self.map.restore(present)
         if not distances:
             return math.inf
