@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 
 from hybridsim.analysis.extrapolation.period_map import PeriodMap
@@ -47,22 +45,6 @@ def after_slight_slips(
         pass
     period_map.restore(first)
     return residual, slight
-
-
-def has_slight_slip(sticks: np.ndarray, largest: np.ndarray, most: float) -> bool:
-    """Return whether a contact slips between two phases of stick by at most a given part of its size.
-
-    Parameters
-    ----------
-    sticks : (K,) whether the contact sticks, in consecutive intervals of a motion that repeats after them.
-    largest : (K,) its largest slip velocity in each interval, in units of the velocity's size.
-    """
-    if not sticks.any():
-        return False
-    first = -int(np.argmax(sticks))
-    sticks, largest = np.append(np.roll(sticks, first), True), np.roll(largest, first)
-    ends = np.flatnonzero(sticks)
-    return any(b > a + 1 and largest[a + 1 : b].max() <= most for a, b in pairwise(ends))
 
 
 def message_of(slight: str) -> str:

@@ -6,9 +6,10 @@ multipliers are those of this mode. A small change of such an orbit leads to ano
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
-from hybridsim.analysis.extrapolation.slight_slips import has_slight_slip
 from hybridsim.engine.record.segments import Segment
 from hybridsim.solution import Solution
 
@@ -62,6 +63,22 @@ def slight_slip(solution: Solution, scale: np.ndarray, most: float) -> str:
         if has_slight_slip(sticks, largest, most):
             return str(system.automata[c].name)
     return ""
+
+
+def has_slight_slip(sticks: np.ndarray, largest: np.ndarray, most: float) -> bool:
+    """Return whether a contact slips between two phases of stick by at most a given part of its size.
+
+    Parameters
+    ----------
+    sticks : (K,) whether the contact sticks, in consecutive intervals of a motion that repeats after them.
+    largest : (K,) its largest slip velocity in each interval, in units of the velocity's size.
+    """
+    if not sticks.any():
+        return False
+    first = -int(np.argmax(sticks))
+    sticks, largest = np.append(np.roll(sticks, first), True), np.roll(largest, first)
+    ends = np.flatnonzero(sticks)
+    return any(b > a + 1 and largest[a + 1 : b].max() <= most for a, b in pairwise(ends))
 
 
 def _values_and_sizes(

@@ -11,8 +11,6 @@ from typing import Any
 import numpy as np
 
 from hybridsim import arguments
-from hybridsim.analysis.extrapolation import slight_slips
-from hybridsim.analysis.extrapolation.model_periods import ModelPeriods, extrapolated
 from hybridsim.analysis.keyword_options import refuse_unknown
 from hybridsim.analysis.steady.approach import is_approached
 from hybridsim.analysis.steady.irregular.incommensurate import follow
@@ -337,6 +335,8 @@ class _Search:
         self.expected = 0
         shot = self._shot(passings, multiple)
         if shot is None and self.period is not None and self.periods >= self._next_extrapolation:
+            from hybridsim.analysis.extrapolation.model_periods import extrapolated
+
             self._next_extrapolation = 2 * self.periods
             most = min(self.periods, _MAX_PERIODS_PER_RUN)
             return extrapolated(self.motion, passings, self.period, self.tol, most)
@@ -364,6 +364,9 @@ class _Search:
         steps = orbit.steps
         orbit = with_shortest_period(self.motion, orbit, self.scale, self.period is not None, self.tol)
         self.newton_steps += orbit.steps - steps
+        from hybridsim.analysis.extrapolation import slight_slips
+        from hybridsim.analysis.extrapolation.model_periods import ModelPeriods
+
         repeated = ModelPeriods(self.motion, orbit.start, orbit.period)
         residual, slight = slight_slips.after_slight_slips(repeated, 1, orbit.residual, self.scale, self.tol)
         orbit = replace(orbit, start=repeated.point, residual=residual)

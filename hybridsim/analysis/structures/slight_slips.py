@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.sparse import csr_array
 
-from hybridsim.analysis.extrapolation.slight_slips import has_slight_slip
+from hybridsim.analysis.steady.on_guard import has_slight_slip
 from hybridsim.mechanics.series_loop.series_trajectory import SeriesTrajectory
 
 _PLACES = np.array([0.25, 0.5, 0.75])  # of a slip, at which its velocity is read
