@@ -8,7 +8,7 @@ from scipy.sparse import csr_array
 from hybridsim.analysis.steady.on_guard import has_slight_slip
 from hybridsim.mechanics.series_loop.series_trajectory import SeriesTrajectory
 
-_PLACES = np.array([0.25, 0.5, 0.75])  # of a slip, at which its velocity is read
+_FRACTIONS = np.array([0.25, 0.5, 0.75])  # of a slip, at which its velocity is read
 
 
 def slight_slip(run: SeriesTrajectory, scale: np.ndarray, most: float) -> str:
@@ -34,13 +34,14 @@ def slight_slip(run: SeriesTrajectory, scale: np.ndarray, most: float) -> str:
         lasts = lengths > 0.0
         phases.append((begins[lasts], lengths[lasts], sticks[lasts]))
     times = [
-        (begins[:, None] + lengths[:, None] * _PLACES)[~sticks].ravel() for begins, lengths, sticks in phases
+        (begins[:, None] + lengths[:, None] * _FRACTIONS)[~sticks].ravel()
+        for begins, lengths, sticks in phases
     ]
     _, velocities = run.forces_and_velocities(np.concatenate(times))
     ends = np.cumsum([len(part) for part in times])
     for c, (end, (_, _, sticks)) in enumerate(zip(ends, phases, strict=True)):
         largest = np.zeros(len(sticks))
-        own = np.abs(velocities[end - len(times[c]) : end, c]).reshape(-1, len(_PLACES))
+        own = np.abs(velocities[end - len(times[c]) : end, c]).reshape(-1, len(_FRACTIONS))
         largest[~sticks] = own.max(axis=1) / sizes[c]
         if has_slight_slip(sticks, largest, most):
             return str(run.event_names[c])
