@@ -12,7 +12,7 @@ import count_prose
 FOLDER = Path(__file__).parents[1] / "studies"
 HEAD = """# Studies
 
-Each study answers one question by measurement. Its page names the command that repeats the measurement.
+Each study answers one question by measurement. The page of a study names the command that repeats the measurement.
 """
 SECTIONS = {
     "Validation": (

@@ -188,9 +188,9 @@ def page(
         "",
         f"`python docs/studies/advice.py` draws {count} points in a map of the reference model `dfcs`. The "
         "ratio F0/N of forcing to normal load is between 0.5 and 1.5. The ratio r of the forcing frequency "
-        "to the natural frequency is between 0.05 and 2. For each point `advise` names the simplest model "
-        f"whose steady amplitude of x has an error of at most {100 * TOL:g} %. The script then searches for "
-        "this model by brute force, with a run of every model:",
+        "to the natural frequency is at most 2 and at least 0.05. For each point `advise` names the "
+        f"simplest model whose steady amplitude of x has an error of at most {100 * TOL:g} %. The script "
+        "then searches for this model by brute force, with a run of every model:",
         "",
         "- The motion of the full model is computed in closed form, from rest until the free vibration has "
         "decayed.",
@@ -231,11 +231,11 @@ def page(
         "(../images/advice-map.png)",
         "",
         "*The map shows the answers of `advise` on a grid with N = 40 N. Below F0 = 20 N nothing moves. For "
-        "motions with stops, the simplest adequate model is usually Karnopp's model, with v0 equal to 1 % "
-        "of the largest speed. At some frequencies the simplest adequate model is friction regularized by "
-        "tanh or arctan, with the same v0. Runs of these three models take at least as long as runs of the "
-        "full model. For motions without stops, Den Hartog's formula is exact. Near resonance equivalent "
-        "viscous damping is adequate.*",
+        "motions with stops, the simplest adequate model is usually Karnopp's model. Its v0 is 1 % of the "
+        "largest speed. At some frequencies the simplest adequate model is friction regularized by tanh or "
+        "arctan, with the same v0. Runs of these three models take at least as long as runs of the full "
+        "model. For motions without stops, Den Hartog's formula is exact. Near resonance equivalent viscous "
+        "damping is adequate.*",
         "",
     ]
     return "\n".join(lines)

@@ -222,9 +222,10 @@ one `hs.sweep` over N. For each load the script finds the largest amplitude over
   amplitude is {1e3 * harmonic[formula]:.4f} mm. In the sweep the smallest amplitude is {
         1e3 * peaks[formula]:.4f}
   mm. Below N = pi F0/(4 mu) = {
-        loads[formula] / 2:.1f} N friction alone cannot limit the resonance. Over all loads
-  the amplitude of the first harmonic differs from the sweep by up to
-  {100 * float(np.max(abs(harmonic / peaks - 1.0))):.2f} %.
+        loads[formula]
+        / 2:.1f} N friction alone cannot limit the resonance. This theory assumes that x is a sine.
+        Over all loads its amplitude differs from that of the sweep by up to
+        {100 * float(np.max(abs(harmonic / peaks - 1.0))):.2f} %.
 """
 
 

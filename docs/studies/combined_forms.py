@@ -168,12 +168,12 @@ best of {pool} random structures. The best structure has the most pairs of forms
 forms are possible.
 
 *The judge* (`tests/reference/combined`) reads an abstract form of the model, and not the model file. The judge
-computes the motion by Taylor series for each combination of modes. It finds zeros by dense sampling and bisection. At
-an instant with an event it tries every combination of modes and of branches of `abs`, `min`, `max` and conditionals.
-A combination is admissible if its conditions are true just after the instant. The judge also finds impulses by trying
-all combinations. If a run disagrees, the judge computes the motion again in 40 digits. A run is compared only as long
-as the motion is certain. The comparison ends if a guard comes closer to zero than 1e-6 and turns back. It also ends
-if the rules permit several motions.
+computes the motion by Taylor series for each combination of modes. The judge finds zeros by dense sampling and
+bisection. At an instant with an event it tries every combination of modes and of branches of `abs`, `min`, `max` and
+conditionals. A combination is admissible if its conditions are true just after the instant. The judge also finds
+impulses by trying all combinations. If a run disagrees, the judge computes the motion again in 40 digits. A run is
+compared only as long as the motion is certain. The comparison ends if a guard comes closer to zero than 1e-6 and
+turns back. The comparison also ends if the rules permit several motions.
 
 A run *agrees* if two conditions are met. First, at {points} times all states and discrete states differ from those of
 the judge by at most {allowed:g} of the size of the motion. Second, all monitors fire as often as with the judge. Two

@@ -103,15 +103,15 @@ solves the whole system of equations in 40 digits. hybridsim uses another method
 pivoting. The combination that hybridsim selects must be admissible.
 
 Each system also runs with its coordinates and contacts declared in {ORDERS} other orders. The columns "orders
-apart" give the largest difference of the final states between these runs and the first run.
+apart" give the largest difference of the final states between the runs in other orders and the first run.
 
 | law | systems | instants decided | not admissible | several admissible | orders apart: median | largest |
 | --- | --- | --- | --- | --- | --- | --- |
 {table}
 
 If static and kinetic friction are equal, the motion is unique. The script nevertheless counts several admissible
-combinations at some instants, because its test is not strict. The test treats values below 1e-9 as zero. The test of
-the script uses only two derivatives of the forces, and none for redundant sets of contacts.
+combinations at some instants. The reason is that its test is not strict. The test treats values below 1e-9 as zero.
+The test of the script uses only two derivatives of the forces, and none for redundant sets of contacts.
 
 If static friction exceeds kinetic friction, several motions may be possible. hybridsim first assumes stick in all
 contacts that may stick. Then hybridsim releases the contacts whose force exceeds the limit. The final states of two

@@ -137,7 +137,7 @@ def page(rows: list[str], never: list[float]) -> str:
     return f"""# Cost of events
 
 How much do monitors, clocks, tables and impacts add to the time of a run? With a linear monitor that never fires, a
-run takes {min(never):.2f} to {max(never):.2f} times as long as without it.
+run takes at most {max(never):.2f} times as long as without the monitor.
 
 `exact`, `taylor` and `dop853` run from event to event in compiled code. In compiled code an ordinary event takes a
 few microseconds. Other events take about a millisecond, because Python code handles them. An example is an event at

@@ -97,8 +97,8 @@ Each file is a model of the package or a scene of the atlas, with one or more of
 - An expression is program code, has too many nested brackets, is too long, or has no value.
 - The text has letters of other alphabets, control characters or bytes that are not text.
 
-Each accepted file is checked for warnings. Its model then runs with a random integrator, over at most one unit of
-simulated time. The limits of the run are 2 seconds, 5000 steps and 500 megabytes.
+Each accepted file is checked for warnings. The model in the file then runs with a random integrator, over at most
+one unit of simulated time. The limits of the run are 2 seconds, 5000 steps and 500 megabytes.
 
 | ending | files |
 | --- | --- |
@@ -112,9 +112,9 @@ runs.
 ## Models with parts
 
 Each model has up to five parts from two other files, with random connections, values, laws and numbers of copies.
-Some models have one of the faults above, a wrong index or an unknown name. Each accepted model is also written as
-one file without parts. This file must give the same model. If a model is refused, the error must name the file, the
-fault and a remedy.
+Some models have one of the faults that are listed for files, a wrong index or an unknown name. Each accepted model
+is also written as one file without parts. The file without parts must give the same model. If a model is refused,
+the error must name the file, the fault and a remedy.
 
 | ending | models |
 | --- | --- |

@@ -165,8 +165,8 @@ Does hybridsim ever miss a zero of a guard? Of {zeros} single zeros of {count} r
 Two zeros may also be so close together that rounding decides whether they exist. The tables below count such pairs.
 
 `python docs/studies/guards.py` draws {count} random guards, half for `exact` and half for `taylor` (rtol
-{rtol:.0e}). The script compares every mode change of the runs with an independent solution. This solution uses a
-closed form of each guard g, with exactly the numbers of the run. The independent solution computes zeros and
+{rtol:.0e}). The script compares every mode change of the runs with an independent solution. The independent solution
+uses a closed form of each guard g, with exactly the numbers of the run. The independent solution computes zeros and
 distances from zero in 40 digits.
 
 A model has two modes. The guard of one mode is g, and the guard of the other mode is -g. Therefore the mode changes
@@ -201,8 +201,8 @@ assumed error of the guard. The assumed error is 1e-13 of the size for `exact`, 
 for `taylor`.
 
 If the error of a single zero is more than ten times its limit, the zero counts as *missed*. The event of a missed
-zero counts as *spurious*. The last column of the table is for single zeros. It gives the largest error of an event
-time, multiplied by the slope of the guard and divided by the size.
+zero counts as *spurious*. The last column is for single zeros. The largest error of an event time is multiplied by
+the slope of the guard, and divided by the size.
 
 ## Pairs, by depth over size
 
@@ -228,7 +228,7 @@ The deepest pair that was only flagged has a depth of {exact:.1e} of the size fo
 `taylor`. The search for zeros in compiled code uses these bounds for the error of the guard:
 
 - For `exact` the bound is (16 + 2 J + 2 w s) 2^-53 of the size. J is the number of modal coordinates, w the largest
-  absolute eigenvalue, and s the time since the last event. In this study the bound is about 4e-15.
+  absolute eigenvalue, and s the time since the last event. In this study the bound for `exact` is about 4e-15.
 - For `taylor` the bound is 2 (|a_N| + |a_N-1|) + 8 2^-53 sum |a_k|. The a_k are the coefficients of the guard's
   series on the step. This bound is at most 6 rtol = {bound:.0e} of the largest value of the guard.
 

@@ -390,8 +390,8 @@ Does the result of a run depend on earlier runs in the same process? {compared} 
 
 `python docs/studies/history.py` tests up to 100 models. The models are those of the package, three chains of blocks,
 and random models ([combined forms](combined-forms.md)). This page shows the results for {models} models, of which
-{many} has more than {limit} combinations of modes. For such a model the process keeps a table of the combinations
-that its runs have reached. Earlier runs therefore change this table.
+{many} has more than {limit} combinations of modes. For a model with more combinations than this, the process keeps a
+table of the combinations that its runs have reached. Earlier runs therefore change this table.
 
 For each model one process makes {runs} other runs, in random order and by random integrators:
 
@@ -403,7 +403,7 @@ For each model one process makes {runs} other runs, in random order and by rando
 
 The *compared run* is a run of the model with its declared numbers. The same process makes the compared run with each
 integrator. First this process searches for spans over which the runs are short. The columns of the table name the
-times at which it makes the compared runs:
+times at which the process makes the compared runs:
 
 - *After the search for spans* means that no other run has been made.
 - *After 1*, *after 30* and *after 1000* mean that this number of other runs has been made.
@@ -412,10 +412,11 @@ times at which it makes the compared runs:
 - *On a thread* means that all integrators run at the same time on one thread each. Two further threads make other
   runs.
 
-The reference is the same run in a new process. The new process makes no other run. It starts with an empty cache of
-compiled models. The last column of the table is for a new process that uses the cache of the process with {runs}
-runs. All results are compared bit for bit. The comparison includes the status, the message, the warnings, all steps,
-and the dense output at {points} times. It also includes the events, with the states before and after them.
+The reference is the same run in a new process. The new process makes no other run. At its start the cache of
+compiled models is empty. The last column of the table is for a new process that uses the cache of the process with
+{runs} runs. All results are compared bit for bit. The comparison includes the status, the message, the warnings, all
+steps, and the dense output at {points} times. The comparison also includes the events, with the states before and
+after them.
 
 """
 

@@ -66,18 +66,18 @@ to 3 gaps. At the instant of the impact each gap either closes, or is already cl
 of each gap is between 0 and 1. Up to 2 gaps also have friction, with a coefficient between 0 and 1.
 
 Let P be the impulses. Let u- and u+ be the relative velocities at the contacts before and after the impact. The
-change of kinetic energy is P.(u- + u+)/2. The table gives this change relative to P.G P/2, which is the kinetic
-energy of the change of velocities. The matrix G is defined by u+ - u- = G P. A gain is a positive change, and a
-loss is a negative change.
+change of kinetic energy is P.(u- + u+)/2. The table gives the change of kinetic energy relative to P.G P/2, which is
+the kinetic energy of the change of velocities. The matrix G is defined by u+ - u- = G P. A gain is a positive
+change, and a loss is a negative change.
 
 | gaps | with friction | impacts | rebound reduced | several outcomes | none | largest gain | median loss |
 | --- | --- | --- | --- | --- | --- | --- | --- |
 {rows}
 
 Rounding errors grow with the condition number of G, which is at most 1e4 here. The column "rebound reduced" counts
-impacts in which Newton's law of restitution would add energy (Kane's paradox). hybridsim then reduces the rebound,
-and the run has a warning. An impact with friction may have several outcomes or no outcome. The run then ends with
-the status `nonunique` or `inconsistent`. See [impacts](../explanation/events.md#impacts).
+impacts in which Newton's law of restitution would add energy (Kane's paradox). In such impacts hybridsim reduces the
+rebound, and the run has a warning. An impact with friction may have several outcomes or no outcome. The run then
+ends with the status `nonunique` or `inconsistent`. See [impacts](../explanation/events.md#impacts).
 """
 
 

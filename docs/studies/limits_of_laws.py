@@ -262,12 +262,12 @@ d and r s have the same order of magnitude. The error is the additional velocity
 **Reversal.** At a reversal the friction force changes by 2 mu N. With Coulomb's law this change is a jump.
 
 - `tanh`, `arctan`, `karnopp`: the change takes the time v0/a, where a is the acceleration. The velocity then has an
-  error of size v0. With `arctan` the force approaches its limit slowly, like v0/(a s) after the time s. The
-  integral of this difference over s gives an error of size v0 log(1/v0).
-- `jenkins`, `dahl`, `lugre`: during the change the body moves by a distance of size 1/stiffness. The body starts
-  from rest with a finite acceleration, so this movement takes a time of size stiffness^(-1/2). The error of the
-  velocity is also of size stiffness^(-1/2). If a body reverses without stick, a spring-like law is therefore a poor
-  model of Coulomb's law.
+  error of size v0. With `arctan` the force approaches its limit slowly, like v0/(a s) after the time s. With
+  `arctan` the integral of this difference over s gives an error of size v0 log(1/v0).
+- `jenkins`, `dahl`, `lugre`: during the change of the force the body moves by a distance of size 1/stiffness. The
+  body starts from rest with a finite acceleration, so this movement takes a time of size stiffness^(-1/2). The error
+  of the velocity is also of size stiffness^(-1/2). If a body reverses without stick, a spring-like law is therefore
+  a poor model of Coulomb's law.
 
 ## References
 

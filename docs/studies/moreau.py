@@ -211,7 +211,7 @@ TEXT = """# At which order does time stepping converge?
 At which order of the step does time stepping converge? All orders of `moreau` lie between {least:.2f} and
 {most:.2f}, in ten scenes with friction and impacts.
 
-The integrator `moreau` does not locate events. It does not use the mode selection of the other integrators. The
+The integrator `moreau` does not locate events, and selects modes in its own way. The
 script `python docs/studies/moreau.py` runs ten scenes with {levels} step sizes. Each step size is half of the
 previous one. The reference is `exact` or `taylor` at rtol 1e-11, which locate every event. The place of an impact
 within its step is random, so single errors scatter. Each error is therefore a mean over {neighbours} neighbouring
@@ -221,8 +221,8 @@ step sizes.
 
 For positions the table gives the largest error at any time. Velocities jump at impacts. If a jump is one step late,
 the error of the velocity during this step is the whole jump. For velocities the table therefore gives the mean
-error over the time. Both errors are relative to the largest value, and are for the finest step.
-The order is the slope of the error over all steps.
+error over the time. The errors of positions and velocities are relative to the largest value, and are for the finest
+step. The order is the slope of the error over all steps.
 
 | dry friction | changes of mode | order of x | order of v (L1) | finest step | error of x | error of v | seconds |
 | --- | --- | --- | --- | --- | --- | --- | --- |

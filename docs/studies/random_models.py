@@ -172,8 +172,8 @@ largest change of the motion in three such trials. The change of basis in `exact
 hundred.
 
 A run is *within* the tolerance if its error is at most {within:.0f} units. For `exact` the limit is {exact:.0e}
-units, which is 1e-12. A method controls only the error of each step. The effect of these errors at the end depends
-on the system.
+units, which is 1e-12. A method controls only the error of each step. The effect of the errors of all steps on the
+final state depends on the system.
 
 | family | integrator | runs | median, end | 99 % | largest | median, between | 99 % | largest | not within |
 | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |

@@ -83,9 +83,9 @@ these kinds of components:
   thermostat.
 - Monitors.
 
-The numbers of each structure are drawn {draws} times, and each set of numbers is called a draw. The draws of a
-structure are run in turn by `dop853` (rtol 1e-9), `taylor` (rtol 1e-10) and, if possible, `exact`. Another of these
-integrators also runs the draw, and the two runs are compared.
+The numbers of each structure are drawn {draws} times, and each set of numbers is called a draw. Each draw runs with
+two of the integrators `dop853` (rtol 1e-9), `taylor` (rtol 1e-10) and, if possible, `exact`. The two runs are
+compared.
 
 The *other method* is time stepping without location of events (`tests/reference/stepped_structures.py`). The forces
 of a step satisfy the laws at the end of the step. The method is of first order. The other method runs with 2003,
@@ -155,9 +155,9 @@ def page(done: list[dict[str, Any]], draws: int) -> str:
     ]
     if open_cases:
         out += (
-            '\nThese draws do not agree and are not sensitive. In the last column "off" is the largest difference '
-            'from the other method, and "bound" is 3 d. "Growth" is the factor by which a change of the start '
-            "grows:\n\n"
+            '\nThe next table lists the draws that do not agree and are not sensitive. In the last column "off" is '
+            'the largest difference from the other method, and "bound" is 3 d. "Growth" is the factor '
+            "by which a change of the start grows:\n\n"
         )
         out += (
             "| structure/draw | integrator | verdict | status | details |\n| --- | --- | --- | --- | --- |\n"

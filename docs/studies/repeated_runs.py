@@ -160,7 +160,7 @@ checks the structure of the model only once. For new numbers hybridsim does four
 one process, in which the kinds of calls alternate. A call is a run with `keep="events"`, and includes reading the
 times and states of all events. Each new value differs from the old value in the eighth digit, so the events do not
 change. A call "by name"
-passes the name of the model. It is compared with a call that passes the `Model` object. {machine()}
+passes the name of the model. A call "by name" is compared with a call that passes the `Model` object. {machine()}
 
 {table}
 

@@ -71,8 +71,8 @@ had a spurious event, and {missed} missed an event.
 After an event a new segment of the run starts, often at a state at which a guard is zero. hybridsim then decides
 whether this guard fires. The script `python docs/studies/restarts.py` makes random restarts on guards and near
 guards. An independent computation in exact arithmetic, called the oracle, decides each restart for the same numbers.
-In most restarts some quantities are zero by definition ([events](../explanation/events.md)). These quantities are
-zero in the oracle too.
+In most restarts some quantities are zero by definition ([events](../explanation/events.md)). Quantities that are
+zero by definition are zero in the oracle too.
 
 hybridsim computes the Taylor series of the guard, with an error bound for each coefficient. Coefficients that are
 zero by definition are skipped, and the next coefficient decides. A restart is *clear* if the true value of the
@@ -85,8 +85,8 @@ is "undecided", and the mode does not change.
 
 The oracle computes the true series with integers of {bits} bits. In the rows "expression" the guard is a random
 expression at a random state. Each expression is used for 500 sets of numbers. A constant is added to the guard. The
-value of the guard is then zero to the last bit, or differs from zero by 1e-19 to 1. In three of ten restarts the
-rate of the guard is changed in the same way.
+value of the guard is then zero to the last bit, or differs from zero by 1e-19 to 1. In three of ten restarts a
+constant is also added to the rate of the guard.
 
 The other rows are for guards of the oscillator that is described under "Whole runs". The parameters of this
 oscillator vary over decades. The restart is up to 10^6 periods after the start. The applied force is at the limit of
@@ -96,10 +96,10 @@ friction or very near to it.
 | --- | --- | --- | --- | --- | --- | --- | --- | --- |
 """
 SEARCHES = """
-A restart is *spurious* if hybridsim finds that the guard fires, but the oracle does not. A restart is *missed* if
-the oracle finds that the guard fires, but hybridsim does not. *Inside, decided* means that the first coefficient is
-within its bound, so that a higher derivative decides. The last column is the largest error of a computed
-coefficient, divided by its bound. The bounds are valid if this quotient is below 1.
+A restart is *spurious* if only hybridsim finds that the guard fires. A restart is *missed* if only the oracle finds
+that the guard fires. *Inside, decided* means that the first coefficient is within its bound, so that a higher
+derivative decides. The last column is the largest error of a computed coefficient, divided by its bound. The bounds
+are valid if this quotient is below 1.
 
 ## Searches
 
@@ -120,8 +120,8 @@ leading coefficient at the start is within its bound.
 
 A run has {periods} periods of a random forced oscillator with friction, at rtol 1e-8. The run begins at a random
 time. The mass sticks, is released, slips, and sticks again. Each run is compared with a closed form. There are four
-kinds of oscillators. In the first kind mu_s = mu_k. In the second kind mu_s is greater than mu_k. In the third kind
-mu_s is greater than mu_k by only a relative 1e-14 to 1e-2. The fourth kind has no damping.
+kinds of oscillators. In oscillators of the first kind, mu_s equals mu_k. In the second kind, mu_s is greater than
+mu_k. In the third kind, mu_s exceeds mu_k by only a relative 1e-14 to 1e-2. The fourth kind has no damping.
 
 | integrator | runs | mode changes | releases | spurious | missed | late | cut short | with a warning |
 | --- | --- | --- | --- | --- | --- | --- | --- | --- |

@@ -147,9 +147,9 @@ def page(
     adaptives = "\n".join(f"| {100 * w:g} % | {100 * e:+.2f} % | {n:.0f} |" for w, e, n in rows)
     return f"""# Limits of fixed steps and of zones around zero velocity
 
-How long may a fixed step be, and how wide may a zone around zero velocity be? In the two systems of this study,
-`rk4-dichotomy` needs 250 steps per period and a zone of at most 0.5 % of the largest speed. These values hold
-if the method sets the velocity to zero in stick. A table below has the values for all methods.
+How long may a fixed step be, and how wide may a zone around zero velocity be? Here `rk4-dichotomy` needs 250 steps
+per period and a zone of at most 0.5 % of the largest speed. These values hold if the method sets the velocity to
+zero in stick. A table below has the values for all methods.
 
 For methods with a fixed step you choose the step h and the width of a zone around v = 0. In this zone the velocity
 counts as zero. The width of the zone is eps_v of `rk4-dichotomy`, or v0 of a regularized law. The script `python
@@ -187,9 +187,9 @@ The option `eps_v` is a speed in the unit of the model. If the largest speed is 
         --option stick_velocity=zero --option steps_per_period=500
 
 `stick_velocity=kept` selects the method in the row with the kept velocity. The models `model.regularized(\"tanh\",
-v0=5e-5)` and `model.regularized("karnopp", v0=5e-4)` have regularized laws. They run with `rk4-sign` or any other
-integrator. The law `tanh` supports only models whose static friction does not exceed kinetic friction. With other
-models `tanh` raises an error.
+v0=5e-5)` and `model.regularized("karnopp", v0=5e-4)` have regularized laws. These models run with `rk4-sign` or any
+other integrator. The law `tanh` supports only models whose static friction does not exceed kinetic friction. With
+other models `tanh` raises an error.
 
 You do not know the largest speed in advance. Just above the threshold of motion this speed is small, and a zone
 then causes the largest errors. Run the model once, read the largest speed, and compare the zone with it. Near the
@@ -238,10 +238,10 @@ runs, whose starts are shifted by equal parts of a step. All other results of th
 
 If the velocity is set to zero, the published setting is right in every case. The published zone is at most 4 % of
 the largest speed. In the case with 4 %, even a zone of 11 % would be right. If the velocity is kept, as in Eq. 4 of
-the paper, the setting is right for a body that never sticks. The setting with the kept velocity is also right for r
-= 0.6 with F0/N = 0.75 and above. It is wrong in every other case. The error grows towards the threshold of motion,
-where the map of the paper has its largest values. For tanh with v0 = 8e-4 m/s, the result is wrong in half of the
-cases. The method `rk4-dichotomy` needs only a fifth of the 1200 steps. If the zone is too wide, more steps do not
+the paper, the setting is right for a body that never sticks. With the kept velocity it is also right for r = 0.6
+with F0/N = 0.75 and above. This setting is wrong in every other case. The error grows towards the threshold of
+motion, where the map of the paper has its largest values. For tanh with v0 = 8e-4 m/s, half of the results are
+wrong. The method `rk4-dichotomy` needs only a fifth of the 1200 steps. If the zone is too wide, more steps do not
 help. The method `rk4-sign` may need ten times as many steps as the published setting.
 
 ![How the boundary moves with r and F0/N](../images/stability-moves.png)
@@ -274,7 +274,8 @@ force permits stick. This false stick causes an error of the amplitude of 75 %.
 **Velocity kept, zone too wide.** The body creeps in stick. When the body should stick, it moves at a speed of up to
 eps_v, by the distance eps_v t_stick. The body then begins its slip with the speed eps_v in the wrong direction. The
 limit of the zone is at eps_v (t_stick + (G_x t_stick + G_v)/(1 - G_x)) = 0.01 X. On the belt the friction decreases
-with the speed. A slip that begins with a wrong speed moves away from the true slip. The limit is therefore 0.34 %.
+with the speed. A slip that begins with a wrong speed moves away from the true slip. The limit on the belt is
+therefore 0.34 %.
 
 | case | early stop: theory | measured | creep: theory | measured | late release: theory, at most | measured |
 | --- | --- | --- | --- | --- | --- | --- |
@@ -285,7 +286,7 @@ The theory of creep assumes that the kept velocity is eps_v. The kept velocity i
 **No stop at all** (F0/N = 1 at r = 0.6, F0/N = 0.75 at r = 0.8). In the zone, Eq. 4 lets the friction force oppose
 the applied force e. The friction force therefore reverses before the velocity. The reversal of the velocity is late
 by m eps_v (1/(e - mu N) - 1/(e + mu N)). This error is of first order in eps_v, and a zone of 1 % of V is already
-too wide. From 4 % of V on, the body sticks at the reversal (F0/N = 1).
+too wide. If the zone is 4 % of V or wider, the body sticks at the reversal (F0/N = 1).
 
 **Zone too narrow.** The dichotomy halves the step 16 times at most. After 16 halvings the speed is up to a h/2^16
 (dotted line). If the zone is narrower than this speed, the method continues with a speed outside the zone. In the
@@ -306,9 +307,9 @@ to 2 mu N h/m. The error of the amplitude is of first order in h. This error is 
 
 **tanh.** If v0 is too large, the body creeps. If v0 is too small, RK4 is unstable. A body that should stick creeps
 at the speed v0 artanh(e/(mu N)). At v = 0 the law has its largest rate, mu N/(m v0). Classic RK4 is stable if its
-step h times this rate is at most 2.785 (dotted line). At smaller v0, below this line, the velocity chatters. The
-amplitude becomes wrong only at a still smaller v0. The friction force is bounded by mu N. For very small v0 the
-result is therefore the same as with `rk4-sign`. Both methods then need the same number of steps.
+step h times this rate is at most 2.785 (dotted line). If v0 is smaller (below the dotted line), the velocity
+chatters. The amplitude becomes wrong only at a still smaller v0. The friction force is bounded by mu N. For very
+small v0 the result is therefore the same as with `rk4-sign`. Both methods then need the same number of steps.
 
 An adaptive method chooses its own step. The table is for `dop853` at rtol = 1e-6 and the reference model.
 

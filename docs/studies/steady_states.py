@@ -225,10 +225,10 @@ of plain runs (`docs/studies/steady_brute.py`), which use `hs.simulate` and noth
 plain runs use `dop853` with the tolerance {rtol:g}.
 
 - A plain run has {short}, then {middle}, then {long} periods of the forcing, and ends earlier if the motion repeats.
-  The states at one phase of each period are compared. The motion has the shortest period, up to {longest} periods of
-  the forcing, after which no state changes by more than {repeats:g} of its range. Without forcing, the states at
-  upward passages of a level are compared.
-- The amplitudes are those of {samples} samples per period, with a search between the samples.
+  The states at one phase of each period are compared. The period of the motion is the shortest time after which no
+  state changes by more than {repeats:g} of its range. This period is at most {longest} periods of the forcing.
+  Without forcing, the states at upward passages of a level are compared.
+- The amplitudes are computed from {samples} samples per period, with a search between the samples.
 - The multipliers of a plain run are computed by differences. For these differences, each state at the beginning of
   the period is changed by {step:g} of its range, upward and downward. If the two changes give different results, the
   motion has no multipliers.
@@ -236,8 +236,9 @@ plain runs use `dop853` with the tolerance {rtol:g}.
   periods. The motion is chaotic if the change grows by more than a factor of {grown:g}.
 
 The amplitudes and periods agree if they differ by at most {equal:g}, relatively. The multipliers are compared by the
-coefficients of their characteristic polynomials. These coefficients may differ by {equal_multipliers:g} of the
-product of 1 + s, over the singular values s of the matrix. The fractions of time in stick are compared too. At
+coefficients of their characteristic polynomials. These coefficients may differ by at most {equal_multipliers:g}
+times the product of 1 + s, over the singular values s of the matrix. The fractions of time in stick are compared
+too. At
 {swept} points with a periodic motion `hs.sweep`, and at {responses} points `hs.frequency_response`, returned the
 amplitude of the plain run. At {scipy} points a program that uses only SciPy (`solve_ivp` with events) found the same
 amplitude and the same fraction of stick. A mechanical system is compared with its ordinary model. The multipliers of

@@ -226,8 +226,8 @@ interrupts runs and sweeps.
 Each run was stopped at {moments} random steps by `limits={{"steps": ...}}` and continued by `resume()`. The table
 counts the runs that stopped. Compiled code checks limits only at certain times. If a run reached its end before the
 next check, it is *done*. Resumed runs are compared bit for bit with a run that was never stopped. The comparison
-includes the times and states of all steps, the status and the message. It also includes the events, with the states
-before and after them.
+includes the times and states of all steps, the status and the message. The comparison also includes the events, with
+the states before and after them.
 
 | integrator | {scenes} |
 | --- | {lines} |

@@ -121,8 +121,8 @@ def claim_figure_4(curves: Curves) -> Claim:
         "figure 4",
         "4",
         (
-            "A and E have converged to 0.1 % at a step of about T/1200, both with stick-slip (eps_v = 1e-6) "
-            "and without stick-slip"
+            "A and E have converged to 0.1 % at a step of about T/1200, with stick-slip (eps_v = 1e-6) and "
+            "without it"
         ),
         {"h0": paper.STEPS_PER_PERIOD, "criterion": LIMIT},
         ours,

@@ -81,8 +81,8 @@ def _head(study: Study, claims: tuple[Claim, ...]) -> str:
 When must a model include stick-slip? The paper of He et al. answers this question by a map, but the values of this
 map depend on the size of the step. The paper is {SOURCE}. The map shows the deviation between a method without stick
 and a method with stick. For small steps, the motion that is computed without stick approaches the motion with stick.
-The values of the map therefore decrease with the step. The motion, its spectrum, and the reduction to two parameters
-are right in the paper. The run times in the paper are those of one implementation.
+If the step decreases, the values of the map therefore decrease too. The motion, its spectrum, and the reduction to
+two parameters are right in the paper. The run times in the paper are those of one implementation.
 
 The system is an oscillator with Coulomb friction and harmonic forcing (model `dfcs`). This study computes every
 figure of the paper again. The integrator `rk4-dichotomy` is our implementation of the published method with
@@ -100,8 +100,8 @@ without stops.
 number of steps per period T of the forcing is h0. Below the speed eps_v, `rk4-dichotomy` treats the velocity as
 zero. A is half the range of x in a period, and E is the integral of x**2 over a period. A0 and E0 are the values of
 A and E without friction. A1 and E1 are the values of the method without stick (`rk4-sign`). A2 and E2 are the
-values of the method with stick (`rk4-dichotomy`). A_D is the deviation |A1 - A2|/A2, and E_D is defined in the same
-way. The paper leaves these details of the methods open:
+values of the method with stick (`rk4-dichotomy`). A_D is the deviation |A1 - A2|/A2, and E_D is |E1 - E2|/E2. The
+paper leaves these details of the methods open:
 
 - *v kept* or *v zero*: in stick the velocity of the body is kept, or set to zero.
 - *release step* or *located*: the release is at the next step, or at the instant at which the applied force reaches
@@ -147,8 +147,9 @@ def _readings(study: Study) -> str:
             "## Details that the paper leaves open",
             "",
             "The table gives the error of the amplitude in per cent, as the mean over the last periods of a run. The",
-            "least and the greatest error of these periods are in brackets. Of the open details, only the velocity in",
-            "stick has a large effect. Eq. 4 of the paper keeps this velocity at its value after the dichotomy.",
+            "least and the greatest error of these periods are in brackets. Of the details that the paper leaves",
+            "open, only the velocity in stick has a large effect. Eq. 4 of the paper keeps this velocity at its value",
+            "after the dichotomy.",
             "",
             "| reading | " + " | ".join(columns) + " |",
             "| --- |" + " --- |" * len(columns),
@@ -166,19 +167,20 @@ def _truth(study: Study, image: Callable[[str], str]) -> str:
         [
             "## Results that hold for any step",
             "",
-            f"The exact steady motion was computed at {points[0]} x {points[1]} points (r, F0/N). In the median, "
-            "the displacements at the beginning and at the end of a period differ by "
-            f"{facts['median residual of periodicity']:.0e} of the amplitude. The largest difference is "
-            f"{facts['largest residual of periodicity']:.0e}. A closed form by Den Hartog gives the boundary "
-            "between motions with stops and motions without stops. The exact motion disagrees with this boundary at "
-            f"{disagree} points. For motions without stops, Den Hartog's closed form of the amplitude agrees with the "
-            f"exact motion to {facts['largest deviation of the closed form where it holds']:.0e}. At low frequencies "
-            f"there are up to {facts['most stops per period']} stops per period.",
+            f"The exact steady motion was computed at {points[0]} x {points[1]} points (r, F0/N). In the "
+            "median, the displacements at the beginning and at the end of a period differ by "
+            f"{facts['median residual of periodicity']:.0e} of the amplitude. The largest of these "
+            f"differences is {facts['largest residual of periodicity']:.0e}. A closed form by Den Hartog "
+            "gives the boundary between motions with stops and motions without stops. The exact motion "
+            f"disagrees with this boundary at {disagree} points. For motions without stops, Den Hartog's "
+            "closed form of the amplitude agrees with the exact motion to "
+            f"{facts['largest deviation of the closed form where it holds']:.0e}. At low frequencies there "
+            f"are up to {facts['most stops per period']} stops per period.",
             "",
             f"![stick fraction, stops per period, amplitude]({image('stick')})",
             "",
-            "At some of the points at which the body moves, the amplitude of a simpler model is within 1 % of the "
-            "exact amplitude. The share of these points is: "
+            "A simpler model is adequate at a point if the error of its amplitude is at most 1 %. The share of "
+            "adequate points among all points with motion is: "
             + ", ".join(f"{name} {_percent(share)}" for name, share in within.items())
             + ". Den Hartog's closed form needs no simulation. The error of this form is below 1 % if less than "
             + _percent(facts["stick fraction below which the closed form without stops is within 1 %"])

@@ -141,7 +141,8 @@ def claim(found: Reduction) -> Claim:
         f"With `exact`, A/A0, E/E0 and the stick fraction were computed at {_SAMPLES} points, for three "
         "normal loads at each point. The results for the three loads differ by at most "
         f"{max(found.rounding.values()):.0e}. A/A0, E/E0 and the stick fraction therefore depend only on r "
-        "and F0/N. Without stick the same holds for A/A0 and E/E0, apart from the chatter. The reduction "
+        "and F0/N. Without stick, A/A0 and E/E0 also depend only on r and F0/N, apart from the chatter. The "
+        "reduction "
         'fails if eps_v or a parameter of the law is a velocity in m/s. With eps_v = 8e-4 m/s and "v '
         f'kept", A/A0 varies by {100 * literal["spread of A/A0"]:.2g} % between F0 = {FORCES[0]:g} N and '
         f"{FORCES[-1]:g} N. With a Stribeck law, which contains a velocity, A/A0 varies by "
@@ -150,8 +151,8 @@ def claim(found: Reduction) -> Claim:
     return Claim(
         "figures 8, 9",
         "8, 9",
-        "A/A0 and E/E0 depend only on r and F0/N, both with stick and without stick. They do not depend on "
-        "F0 and N separately",
+        "A/A0 and E/E0 depend only on r and F0/N, both with stick and without stick. These quotients do not "
+        "depend on F0 and N separately",
         {"spread": "constant"},
         ours,
         closest,
