@@ -44,7 +44,7 @@ PHRASES = {
 }
 # A full stop after these does not end a sentence.
 ABBREVIATION = re.compile(r"\b(e\.g|i\.e|et al|Fig|Eq|vs|cf|No|pp?)\.$")
-END = re.compile(r"[.!?][)\"'*”]*(?=\s+[(\"'“*]*([A-Z0-9]|hybridsim\b))")
+END = re.compile(r"[.!?][)\"'*”]*(?=\s+[(\[\"'“*]*([A-Z0-9`]|(hybridsim|numba)\b))")
 
 
 @dataclass

@@ -59,12 +59,13 @@ MOVES: dict[str, dict[str, Any]] = {
 
 HEAD = """# Gallery
 
-This page shows every model of the package. `hybridsim run NAME` runs a model over its own duration. `hybridsim check
-NAME` prints the source and the description of a model, and `hs.load("NAME")` loads the model in Python. Tests compare
-the models with closed forms, balances and matrix exponentials. `docs/make/gallery.py` makes this page and its pictures.
+This page shows every model of the package. The command `hybridsim run NAME` runs a model over its own duration. The
+command `hybridsim check NAME` prints the source and the description of a model. In Python `hs.load("NAME")` loads the
+model. Tests compare the models with closed forms, balances and matrix exponentials. The script
+`docs/make/gallery.py` makes this page and its pictures.
 
-Many files also contain a [drawing](../how-to/draw-a-mechanism.md) of the mechanism. `hybridsim run NAME --animate
-NAME.gif` animates this drawing. In the animation the colour of a contact shows its mode.
+Many files also contain a [drawing](../how-to/draw-a-mechanism.md) of the mechanism. The command `hybridsim run NAME
+--animate NAME.gif` animates this drawing. In the animation the colour of a contact shows its mode.
 
 """
 

@@ -15,8 +15,8 @@ from hybridsim.integrators.options import options_of
 PAGE = Path(__file__).parents[1] / "reference" / "integrators.md"
 HEAD = """# Integrators
 
-This page lists the integrators with their limitations and options. `docs/make/integrator_page.py` writes it
-from the code, and `hybridsim integrators NAME` prints the same text. See [Choose an
+This page lists the integrators with their limitations and options. The script `docs/make/integrator_page.py` writes
+it from the code. The command `hybridsim integrators NAME` prints the same text. See [Choose an
 integrator](../how-to/choose-an-integrator.md) for advice.
 
 Pass an option as a keyword of `hs.simulate`, or with `--option NAME=VALUE` on the command line.
