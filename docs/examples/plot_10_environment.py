@@ -4,8 +4,9 @@ A drill as an environment for a learning agent
 
 A drill string stores twist between its drive and its bit. The dry friction of the bit on the rock decreases with the
 speed. Under a constant torque the bit therefore sticks and slips. The class below has the methods ``reset`` and
-``step`` of an environment of gymnasium. Its action is a torque that is constant between two calls of ``step``. The
-class also works without gymnasium. If gymnasium is installed, the class registers itself.
+``step`` of an environment of gymnasium. The action of an agent is a torque, which is
+constant between two calls of ``step``. The class also works without gymnasium. If gymnasium is installed, the class
+registers itself.
 """
 
 import matplotlib.pyplot as plt

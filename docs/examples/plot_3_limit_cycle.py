@@ -2,8 +2,8 @@
 A limit cycle and how it grows with the belt's speed
 ====================================================
 
-:func:`hybridsim.steady_state` finds the motion to which a model settles. It uses derivatives that include the effect of
-every event. :func:`hybridsim.sweep` finds such motions for many parameter values.
+:func:`hybridsim.steady_state` finds the motion to which a model settles. This function uses derivatives that
+include the effect of every event. :func:`hybridsim.sweep` finds such motions for many parameter values.
 """
 
 import numpy as np

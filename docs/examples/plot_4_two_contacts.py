@@ -34,7 +34,7 @@ sol = hs.simulate(system.to_model(), (0, 40))
 plot.save(plot.time_history(sol, ["q1", "q2", "v1", "v2"]), "blocks.png")
 
 # %%
-# The work of the contacts is the integral of -f q' over time, by Gauss quadrature between any two events. It is
+# The work of the contacts is the integral of -f q' over time, by Gauss quadrature between any two events. This work is
 # compared with the change of the energy.
 
 nodes, weights = np.polynomial.legendre.leggauss(20)

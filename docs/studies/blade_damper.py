@@ -183,10 +183,10 @@ Which normal load N makes the damper under the platform of a turbine blade most 
 is **{loads[best]:.1f} N**, with a resonant amplitude of {
         1e3 * peaks[best]:.4f} mm. Without a damper the resonant amplitude is {
         ends[0] / peaks[best]:.1f} times as
-        large as with the best load. With a damper that always sticks, it is {
-        ends[1] / peaks[best]:.1f} times as
-        large as with the best load. With a very small load, the damper dissipates almost nothing. With a very large
-        load, the damper sticks, and only makes the blade stiffer.
+        large as with the best load. With a damper that always sticks, the amplitude is {
+        ends[1]
+        / peaks[best]:.1f} times as large. With a very small load, the damper dissipates almost nothing. With
+        a very large load, the damper sticks, and only makes the blade stiffer.
 
 The model `models/blade-damper.toml` is one mode of the blade with a Jenkins element (Griffin 1980,
 [doi:10.1115/1.3230256](https://doi.org/10.1115/1.3230256)). The script `python docs/studies/blade_damper.py` runs

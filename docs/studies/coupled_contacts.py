@@ -114,7 +114,7 @@ combinations at some instants. The reason is that its test is not strict. The te
 The test of the script uses only two derivatives of the forces, and none for redundant sets of contacts.
 
 If static friction exceeds kinetic friction, several motions may be possible. hybridsim first assumes stick in all
-contacts that may stick. Then hybridsim releases the contacts whose force exceeds the limit. The final states of two
+contacts that can stick. Then hybridsim releases the contacts whose force exceeds the limit. The final states of two
 orders of declaration differ because of rounding.
 
 ## Work and energy

@@ -84,8 +84,8 @@ TEXT = """# Wrong files, wrong command lines
 
 Does a faulty model file or command line ever cause an internal error? {verdict} The script `docs/studies/fuzz.py`
 ran {files} model files, {parts} models with parts and {lines} command lines. The files and command lines contain
-typical mistakes of users, editors and scripts, and deliberate attacks. No case may cause an internal error, a
-traceback, a warning of a library, a hang or an unwanted file. No text of a file may run as code.
+typical mistakes of users, editors and scripts, and deliberate attacks. A case must not cause an internal error, a
+traceback, a warning of a library, a hang or an unwanted file. The text of a file must not run as code.
 
 ## Model files
 

@@ -112,13 +112,13 @@ zeros by Sturm's method in integers. The columns "stays" and "leaves" count sear
 | --- | --- | --- | --- | --- | --- | --- | --- | --- |
 """
 RUNS = """
-A search is *open* if the computed function is at some time within its error bound. The function may then be zero at
-this time. After an open search, another method searches again by sampling the guard. *Start inside* means that the
-leading coefficient at the start is within its bound.
+A search is *open* if, at some time, the computed function is smaller than its error bound. The function may then be
+zero at this time. After an open search, another method searches again by sampling the guard. *Start inside* means
+that the leading coefficient at the start is within its bound.
 
 ## Whole runs
 
-A run has {periods} periods of a random forced oscillator with friction, at rtol 1e-8. The run begins at a random
+A run lasts {periods} periods of a random forced oscillator with friction, at rtol 1e-8. The run begins at a random
 time. The mass sticks, is released, slips, and sticks again. Each run is compared with a closed form. There are four
 kinds of oscillators. In oscillators of the first kind, mu_s equals mu_k. In the second kind, mu_s is greater than
 mu_k. In the third kind, mu_s exceeds mu_k by only a relative 1e-14 to 1e-2. The fourth kind has no damping.

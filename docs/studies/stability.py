@@ -183,10 +183,12 @@ impacts.
 The option `eps_v` is a speed in the unit of the model. If the largest speed is 0.1 m/s, a share of 0.5 % is eps_v =
 5e-4 m/s:
 
-    hybridsim run dfcs --integrator rk4-dichotomy --option eps_v=5e-4 \\
-        --option stick_velocity=zero --option steps_per_period=500
+```bash
+hybridsim run dfcs --integrator rk4-dichotomy --option eps_v=5e-4 \\
+    --option stick_velocity=zero --option steps_per_period=500
+```
 
-`stick_velocity=kept` selects the method in the row with the kept velocity. The models `model.regularized(\"tanh\",
+`stick_velocity=kept` selects the method in the row with the kept velocity. The models `model.regularized("tanh",
 v0=5e-5)` and `model.regularized("karnopp", v0=5e-4)` have regularized laws. These models run with `rk4-sign` or any
 other integrator. The law `tanh` supports only models whose static friction does not exceed kinetic friction. With
 other models `tanh` raises an error.

@@ -235,8 +235,8 @@ plain runs use `dop853` with the tolerance {rtol:g}.
 - If a motion does not repeat, its state is changed by {perturbed:g}. This change is followed over {followed}
   periods. The motion is chaotic if the change grows by more than a factor of {grown:g}.
 
-The amplitudes and periods agree if they differ by at most {equal:g}, relatively. The multipliers are compared by the
-coefficients of their characteristic polynomials. These coefficients may differ by at most {equal_multipliers:g}
+The amplitudes and periods agree if their relative difference is at most {equal:g}. The multipliers are compared by
+the coefficients of their characteristic polynomials. These coefficients may differ by at most {equal_multipliers:g}
 times the product of 1 + s, over the singular values s of the matrix. The fractions of time in stick are compared
 too. At
 {swept} points with a periodic motion `hs.sweep`, and at {responses} points `hs.frequency_response`, returned the

@@ -106,8 +106,9 @@ def page(
             f"On threads and on a cluster the results of {count} points are {same}.",
             "",
             f"`python docs/studies/sweeps.py` runs `hs.sweep` at {count} random points of the model `dfcs`.",
-            f"The measures of the sweep are {', '.join(MEASURES)}.",
-            "F0/N is from 0.5 to 1.5, omega from 0.05 to 2 of the natural frequency, and c from 2 to 20 N s/m.",
+            f"The measures of the sweep are {', '.join(f'`{name}`' for name in MEASURES[:-1])} and `{MEASURES[-1]}`.",
+            "F0/N is from 0.5 to 1.5, omega from 0.05 to 2 times the natural frequency, and c from 2 to 20 "
+            "N s/m.",
             f"{machine()}",
             "",
             "| executor | seconds | points per second |",

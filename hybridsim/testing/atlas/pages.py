@@ -53,7 +53,7 @@ In the tables of the scenes, a number follows the name of a method. This number 
 last setting in the table above. The first error is that of event times, in units of the scene. The second error is
 that of states, relative to their largest true value. If the error decreases with the step, the table also has the
 observed order of convergence. Each integrator states in `lacks` the features that it does not support. The atlas
-also runs scenes that need such a feature. In these scenes the missing feature is the reason of a failure or refusal.
+also runs scenes that need such a feature. In these scenes the missing feature is the reason for a failure or refusal.
 
 Most methods use the event location and the mode selection of the engine. The exceptions are the fixed-step methods, and
 methods with native events, a cooldown or regularized friction. If all methods are right in a scene, the text of the

@@ -184,9 +184,9 @@ def _truth(study: Study, image: Callable[[str], str]) -> str:
             + ", ".join(f"{name} {_percent(share)}" for name, share in within.items())
             + ". Den Hartog's closed form needs no simulation. The error of this form is below 1 % if less than "
             + _percent(facts["stick fraction below which the closed form without stops is within 1 %"])
-            + " of the period is stick, and below 5 % if less than "
+            + " of the period is stick. It is below 5 % if less than "
             + _percent(facts["stick fraction below which the closed form without stops is within 5 %"])
-            + " is stick.",
+            + " of the period is stick.",
             "",
             f"![deviation of simpler models]({image('simpler-models')})",
             "",
