@@ -110,8 +110,9 @@ apart" give the largest difference of the final states between the runs in other
 {table}
 
 If static and kinetic friction are equal, the motion is unique. The script nevertheless counts several admissible
-combinations at some instants. The reason is that its test is not strict. The test treats values below 1e-9 as zero.
-The test of the script uses only two derivatives of the forces, and none for redundant sets of contacts.
+combinations at some instants. The reason is that the test of the script is not strict. The test treats values below
+1e-9 as zero. The test of the script uses only two derivatives of the forces, and none for redundant sets of
+contacts.
 
 If static friction exceeds kinetic friction, several motions may be possible. hybridsim first assumes stick in all
 contacts that can stick. Then hybridsim releases the contacts whose force exceeds the limit. The final states of two

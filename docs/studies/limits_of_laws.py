@@ -222,8 +222,9 @@ script compares the motion with a closed form of the motion with Coulomb's law. 
 | --- | --- | --- | --- | --- |
 {about}
 
-The relative width e is v0 divided by the largest speed, or the deflection mu N/stiffness divided by the largest
-displacement. The error is the largest error of the displacement x during the run.
+For a regularized law, the relative width e is v0 divided by the largest speed. For a spring-like law, e is the
+deflection mu N/stiffness divided by the largest displacement. The error is the largest error of the displacement x
+during the run.
 
 ![Error over the width of a law, six laws in three scenes](../images/limits-of-laws.png)
 
@@ -271,9 +272,9 @@ d and r s have the same order of magnitude. The error is the additional velocity
 
 ## References
 
-- Regularizations by a function of the velocity, and their run times: E. Pennestri et al., Nonlinear Dyn. 83 (2016)
+- Regularizations by a function of the velocity, and their run times: Pennestri et al., Nonlinear Dynamics 83 (2016)
   1785, [doi:10.1007/s11071-015-2485-3](https://doi.org/10.1007/s11071-015-2485-3).
-- Convergence of the solutions of regularized equations to Filippov solutions: A. F. Filippov, *Differential
+- Convergence of the solutions of regularized equations to Filippov solutions: Filippov, *Differential
   Equations with Discontinuous Righthand Sides* (1988),
   [doi:10.1007/978-94-015-7793-9](https://doi.org/10.1007/978-94-015-7793-9).
 - Karnopp's law, [doi:10.1115/1.3140698](https://doi.org/10.1115/1.3140698).

@@ -145,9 +145,9 @@ HEAD = """# Random models against references
 Are the errors of runs as small as the tolerance requests? Of {runs} runs of random models, {faults} exceed the
 allowed error.
 
-`python docs/studies/random_models.py` makes 200 random structures, and runs each structure with {draws} random sets
-of parameters and initial values. The script compares every run with a reference at four times. Three of these times
-are between steps, as a test of the dense output. The fourth time is the end of the run.
+`python docs/studies/random_models.py` makes 200 random structures. Each structure runs with {draws} random sets of
+parameters and initial values. The script compares every run with a reference at four times. Three of these times are
+between steps, as a test of the dense output. The fourth time is the end of the run.
 
 - There are 100 dense linear systems x' = A x + f phi(t) of one to eight states. There are six kinds of matrices A.
   A *generic* matrix has random elements. An *oscillatory* matrix causes about ten oscillations in a run. A

@@ -253,7 +253,7 @@ lines, one above the other. Between these lines the error changes its sign, so a
 
 If the velocity is set to zero, the limit of the zone is an almost constant share of the largest speed. This share is
 9 to 15 % if the body sticks, and 1 to 2 % if the body only reverses. If the velocity is kept, the limit is 0.2 to
-0.8 %, and is smallest for long sticks. For tanh the limit is 0.15 % to 2.3 %, and follows no such rule. In m/s, a
+0.8 %. It is smallest for long sticks. For tanh the limit is 0.15 % to 2.3 %, and follows no such rule. In m/s, a
 limit is smaller if the largest speed is smaller. An example is the case r = 0.6. If F0/N decreases from 0.75 to
 0.54, the limit for the velocity set to zero decreases from 0.034 to 0.0022 m/s. The limit for the kept velocity
 decreases from 1.8e-3 to 4e-5 m/s.
@@ -270,8 +270,8 @@ the derivative of G with respect to an outward speed at the release.
 position of the stop has an error of eps_v^2/(2 a). This error occurs at every stop. The error of the amplitude
 reaches 1 % at eps_v^2/(2 a) = 0.01 X (1 - G_x). On the belt the extreme of x is reached before the stop, when the
 relative speed is that of the belt. On the belt the limit is therefore at (eps_v - v_belt)^2/(2 a) = 0.02 X. This
-formula gives 41 % of V, and the measured limit is 36 %. If eps_v is above V, the body sticks as soon as the applied
-force permits stick. This false stick causes an error of the amplitude of 75 %.
+limit is 41 % of V, and the measured limit is 36 %. If eps_v is above V, the body sticks as soon as the applied force
+permits stick. This false stick causes an error of the amplitude of 75 %.
 
 **Velocity kept, zone too wide.** The body creeps in stick. When the body should stick, it moves at a speed of up to
 eps_v, by the distance eps_v t_stick. The body then begins its slip with the speed eps_v in the wrong direction. The
@@ -311,7 +311,8 @@ to 2 mu N h/m. The error of the amplitude is of first order in h. This error is 
 at the speed v0 artanh(e/(mu N)). At v = 0 the law has its largest rate, mu N/(m v0). Classic RK4 is stable if its
 step h times this rate is at most 2.785 (dotted line). If v0 is smaller (below the dotted line), the velocity
 chatters. The amplitude becomes wrong only at a still smaller v0. The friction force is bounded by mu N. For very
-small v0 the result is therefore the same as with `rk4-sign`. Both methods then need the same number of steps.
+small v0 the result with tanh is therefore the same as with `rk4-sign`. Both methods then need the same number of
+steps.
 
 An adaptive method chooses its own step. The table is for `dop853` at rtol = 1e-6 and the reference model.
 
@@ -320,9 +321,9 @@ An adaptive method chooses its own step. The table is for `dop853` at rtol = 1e-
 {adaptives}
 
 **Karnopp's band.** The body enters the band at the speed v0. Stops are therefore too early, as with the velocity
-set to zero. If the body sticks, the limit is the same too. The events are located, so the step has almost no
-effect. On the belt the body first has to cross the band, while the friction force is at its limit. The slip of the
-body is therefore late, and the limit is 1.1 %.
+set to zero. If the body sticks, the limit of Karnopp's band is also the same as with the velocity set to zero. The
+events are located, so the step has almost no effect. On the belt the body first has to cross the band, while the
+friction force is at its limit. The slip of the body is therefore late, and the limit is 1.1 %.
 """
 
 

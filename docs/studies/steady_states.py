@@ -216,11 +216,11 @@ HEAD = """# Steady states against plain runs
 
 Does `hs.steady_state` find the motion that a long run reaches? At {agree} of {all} random points `hs.steady_state`
 agrees with a plain run. At {irregular} further points both methods find a motion that does not repeat. {slow} points
-had not settled at the end of the plain run. At {refused} points both methods find no steady state. At {differ} the
-results differ.
+had not settled at the end of the plain run. At {refused} points both methods find no steady state. The results
+differ at {differ} of the points.
 
-`python docs/studies/steady_states.py` draws the numbers of {kinds} kinds of models at random, and compares two
-results for each point. One result is that of `hs.steady_state` with at most {most} periods. The other result is that
+`python docs/studies/steady_states.py` draws the numbers of {kinds} kinds of models at random. For each point it
+compares two results. One result is that of `hs.steady_state` with at most {most} periods. The other result is that
 of plain runs (`docs/studies/steady_brute.py`), which use `hs.simulate` and nothing of `hybridsim.analysis`. The
 plain runs use `dop853` with the tolerance {rtol:g}.
 
@@ -239,9 +239,10 @@ The amplitudes and periods agree if their relative difference is at most {equal:
 the coefficients of their characteristic polynomials. These coefficients may differ by at most {equal_multipliers:g}
 times the product of 1 + s, over the singular values s of the matrix. The fractions of time in stick are compared
 too. At
-{swept} points with a periodic motion `hs.sweep`, and at {responses} points `hs.frequency_response`, returned the
-amplitude of the plain run. At {scipy} points a program that uses only SciPy (`solve_ivp` with events) found the same
-amplitude and the same fraction of stick. A mechanical system is compared with its ordinary model. The multipliers of
+{swept} points with a periodic motion `hs.sweep` returned the amplitude of the plain run. The function
+`hs.frequency_response` returned it at {responses} points. At {scipy} points a program that uses only SciPy
+(`solve_ivp` with events) found the same amplitude and the same fraction of stick. A mechanical system is compared
+with its ordinary model. The multipliers of
 {multipliers} points are compared.
 
 | kind of model | points | agree | do not repeat | had not settled | no steady state | differ |

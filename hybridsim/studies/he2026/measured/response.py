@@ -161,14 +161,14 @@ def claim_figure_12(runs: dict[str, Response], study: StepStudy) -> Claim:
         f"{paper.described(closest)}. With this pair A_D is "
         f"{100 * ours[closest]['A_D']:.1f} %. The method without stick deviates from the exact motion. If "
         f"h0 increases from {paper.STEPS_PER_PERIOD} to {STEPS[-1]}, this deviation decreases. With "
-        f'"sign by step" the deviation decreases {by_step}. With "sign by stage" it decreases {by_stage}.'
+        f'"sign by step" the deviation decreases {by_step}. With "sign by stage" the deviation decreases {by_stage}.'
     )
     return Claim(
         "figure 12",
         "12",
         (
-            "A_D is 15 % at F0/N = 0.54, r = 0.55. Without stick, the claimed friction force jumps between "
-            "its limits around v = 0"
+            "A_D is 15 % at F0/N = 0.54, r = 0.55. The paper also claims that, without stick, the friction force "
+            "jumps between its limits around v = 0"
         ),
         {"A_D": 0.15},
         ours,

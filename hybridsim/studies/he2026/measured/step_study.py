@@ -69,7 +69,8 @@ class StepStudy:
         return (
             "On the ridge the method without stick deviates from the exact motion. If h0 increases from "
             f"{STEPS_PER_PERIOD} to {STEPS[-1]}, this deviation decreases. "
-            f'With "sign by step" the deviation decreases {by_step}. With "sign by stage" it decreases {by_stage}.'
+            f'With "sign by step" the deviation decreases {by_step}. With "sign by stage" '
+            f"the deviation decreases {by_stage}."
         )
 
     def to_plain(self, quantity: str) -> dict[str, Any]:
