@@ -14,6 +14,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+from matplotlib.ticker import LogLocator, NullFormatter
 from scipy.optimize import brentq, minimize_scalar
 
 import hybridsim as hs
@@ -88,7 +89,9 @@ def picture(found: hs.Sweep, curves: hs.Sweep, blade: Blade) -> None:
             FREQUENCIES, 1e3 * curves["amplitude.x"][i], color=style.PALETTE[i], label=f"N = {load:g} N"
         )
     response.set(xlabel="frequency of the excitation [rad/s]", ylabel="amplitude of x [mm]")
+    response.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
     response.yaxis.set_major_formatter("{x:g}")
+    response.yaxis.set_minor_formatter(NullFormatter())
     response.legend(
         fontsize=9, ncols=2, loc="lower left", bbox_to_anchor=(0, 1), frameon=False, borderaxespad=0.2
     )
@@ -112,7 +115,7 @@ def picture(found: hs.Sweep, curves: hs.Sweep, blade: Blade) -> None:
         loads[slipping],
         loop_area(found, blade)[slipping],
         color=style.PALETTE[2],
-        label="4 mu N (A - mu N/k_d)",
+        label="$4 \\mu N (A - \\mu N/k_d)$",
     )
     lower.loglog(
         loads[slipping], found["work"][slipping], "o", ms=4, color=style.PALETTE[0], label="integrated"

@@ -106,7 +106,7 @@ def picture(growth: dict[float, np.ndarray], sizes: dict[float, np.ndarray]) -> 
     left.plot([], [], "s", ms=7, mfc="none", color=style.GREY, label="linearize")
     left.plot([], [], ".", ms=5, color=style.INK, label="simulation")
     left.axhline(0.0, color=style.INK, lw=0.8)
-    left.set(xlabel="coefficient of friction mu", ylabel="growth rate")
+    left.set(xlabel="coefficient of friction µ", ylabel="growth rate")
     left.legend(
         fontsize=9, loc="lower left", bbox_to_anchor=(0, 1), ncols=3, frameon=False, borderaxespad=0.2
     )
@@ -121,7 +121,7 @@ def picture(growth: dict[float, np.ndarray], sizes: dict[float, np.ndarray]) -> 
             label=f"x starts {shake:g} away",
         )
     right.axvline(threshold(SQUEALING), color=style.GREY, lw=0.9, ls=":", label="onset, closed form")
-    right.set(xlabel="coefficient of friction mu", ylabel=f"final amplitude of x, c = {SQUEALING:g}")
+    right.set(xlabel="coefficient of friction µ", ylabel=f"final amplitude of x, c = {SQUEALING:g}")
     right.legend(
         fontsize=9, loc="lower left", bbox_to_anchor=(0, 1), ncols=2, frameon=False, borderaxespad=0.2
     )

@@ -70,7 +70,7 @@ def maps(case: Case, found: dict[str, Map], star: tuple[float, str], path: Path)
             label="wrong number of stops",
         )
         panel.plot([], [], "-", color="black", lw=2.4, label="error 1 %")
-        panel.set(xscale="log", yscale="log", xlim=(steps[0], steps[-1]), ylim=(zones[0], zones[-1]))
+        panel.set(xscale="log", yscale="log")  # with whole cells at the edges, and whole marks in them
         theory(panel, case, method, np.geomspace(steps[0], steps[-1], 50))
         panel.plot(PAPER_STEPS, star[0], "*", color="white", mec="black", ms=15, ls="", label=star[1])
         panel.set_title(method.title, fontsize=10, loc="left")

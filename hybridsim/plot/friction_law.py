@@ -17,6 +17,7 @@ from hybridsim.plot.shared.smooth_parts import Window, samples_of
 from hybridsim.simulate import simulate
 
 _PARTS = 300  # first division of the speeds
+_ARROW = 0.3  # of the length of a loop: an arrow halfway would be at the turning point of the velocity
 
 
 def friction_law(
@@ -120,6 +121,6 @@ def _driven(
     for panel, x in zip(axes, curves, strict=False):
         panel.plot(x, force, color=style.INK, linewidth=1.4)  # one curve: the law has no modes of slip
         if contact.law.states:
-            style.point_along(panel, x, force, style.INK)
+            style.point_along(panel, x, force, style.INK, _ARROW)
     if len(axes) > 1:
         axes[1].set_xlabel("displacement", fontsize=9)

@@ -5,8 +5,13 @@ from __future__ import annotations
 import ast
 import importlib
 import sys
+from dataclasses import replace
+from math import nan
 from pathlib import Path
+from types import SimpleNamespace
+from unittest import mock
 
+import numpy as np
 import pytest
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -14,9 +19,12 @@ from plot.fake_comparison import comparison
 from plot.fake_solution import ball, oscillator
 
 from hybridsim.plot import friction_law, phase_portrait, save, time_history, work_precision
+from hybridsim.plot.atlas import scene
 from hybridsim.plot.shared import style
+from hybridsim.testing.atlas.example import Example, Line
 
 sys.path.append(str(Path(__file__).parents[2] / "docs" / "make"))
+sys.path.append(str(Path(__file__).parents[2] / "docs" / "studies"))
 from check_pictures import IMAGES, contrast, faults_of_figure, faults_of_file, faults_of_png
 
 DOCS = IMAGES.parent
@@ -61,6 +69,43 @@ def test_the_text_of_a_picture_can_be_read(path: Path) -> None:
 )
 def test_labels_have_room(draw) -> None:
     assert not faults_of_figure(style.figure_of(draw()))
+
+
+def test_a_picture_of_the_atlas_writes_numbers_of_events_and_draws_no_empty_strip() -> None:
+    """Times of a thousandth have room, and small values have a power of ten on their axis."""
+    t = np.linspace(0, 2.1e-3, 50)
+    right, failing = (Line(name, t, 1e-6 * t, np.array([1e-3] * n)) for name, n in (("right", 2), ("dop", 1)))
+    figure = style.figure_of(scene(Example("y", "", right, failing, ())))
+    assert not faults_of_figure(figure)
+    assert [text.get_text() for text in figure.axes[-1].texts] == ["2 events", "1 event"]
+    assert figure.axes[0].get_ylabel() == "y [$10^{-9}$]"
+    none = replace(right, events=np.array([]))
+    assert len(style.figure_of(scene(Example("y", "", none, None, ()))).axes) == 1
+
+
+def test_methods_with_undefined_errors_are_at_the_top_of_the_chart_of_speed(tmp_path: Path) -> None:
+    chart = importlib.import_module("rivals.chart")
+    lines = [
+        SimpleNamespace(
+            method=SimpleNamespace(label=name, family="rival", shown=True),
+            errors=SimpleNamespace(times=error, states=1e-6, right=right),
+            events=SimpleNamespace(middle=seconds),
+            grid=SimpleNamespace(middle=seconds),
+        )
+        for name, seconds, error, right in (
+            ("late", 1e-1, nan, False),
+            ("early", 1e-2, nan, False),
+            ("good", 1e-3, 1e-9, True),
+            ("unknown", 1e-4, nan, None),
+        )
+    ]
+    figures: list[Figure] = []
+    with mock.patch.object(style, "save", lambda figure, path: figures.append(figure)):
+        chart.charts({"P1": SimpleNamespace(title="P1")}, {"P1": lines}, tmp_path)
+    panel = figures[0].axes[0]
+    marks = {line.get_xdata()[0]: line.get_ydata()[0] for line in panel.lines}
+    assert marks == {1e-3: 1e-9, 1e-2: panel.get_ylim()[1], 1e-1: panel.get_ylim()[1]}
+    assert "at the top, from the left:\nearly\nlate" in [text.get_text() for text in panel.texts]
 
 
 def written(tmp_path: Path, **settings) -> Path:

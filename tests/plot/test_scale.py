@@ -17,6 +17,9 @@ from hybridsim.plot.shared.symbols import label_of, symbol_of, unit_text
         ("N", -20, 20, "x [N]"),
         ("N", 0, 25e3, "x [kN]"),
         ("s", 0, 1e-3, "x [ms]"),
+        ("rad", 0, 2e-3, "x [mrad]"),
+        ("rad/s", 0, 1400, "x [rad/s]"),  # krad is unusual
+        ("rad/s", 0, 14000, "x [$10^{3}$ rad/s]"),
         ("kg", 0, 20, "x [kg]"),
         ("kg", 0, 2e-5, "x [$10^{-6}$ kg]"),
         ("", 0, 1, "x"),
@@ -48,6 +51,7 @@ def test_ticks_have_the_decimals_they_need() -> None:
         ({"x1": ("m", 0, 0.5), "x2": ("m", 0, 1.0)}, {"x1": 0, "x2": 0}),
         ({"x": ("m", 0, 1.0), "z": ("m", 0, 1e-6)}, {}),  # six digits apart: one prefix suits none of both
         ({"x": ("m", 0, 0), "v": ("m/s", 0, 1)}, {}),
+        ({"w1": ("rad/s", 0, 1400), "w2": ("rad/s", 0, 900)}, {"w1": 0, "w2": 0}),
     ],
 )
 def test_quantities_of_one_base_unit_share_a_prefix(quantities: dict, powers: dict) -> None:

@@ -22,18 +22,12 @@ _LOOKS = {
     "limit": (style.INK, "D", "closed form by hand"),
 }
 _FLOOR = 1e-17
+_ROOM = 30.0  # above the errors of a panel with undefined errors
 # where a name may stand beside its marker, in points: (x, y, horizontal, vertical)
 _PLACES = [
     (dx, dy, "left" if dx > 0 else "right" if dx < 0 else "center", "center")
-    for reach in (0, 1, 2, 3)
-    for dx, dy in (
-        (6, 0 + 9 * reach),
-        (-6, 0 + 9 * reach),
-        (6, -9 * reach),
-        (-6, -9 * reach),
-        (0, 9 + 9 * reach),
-        (0, -9 - 9 * reach),
-    )
+    for lift in range(0, 31, 6)
+    for dx, dy in ((6, lift), (-6, lift), (6, -lift), (-6, -lift), (0, 9 + lift), (0, -9 - lift))
 ]
 
 
@@ -48,7 +42,7 @@ def charts(
             folder / "speed-events.png",
             "time, events alone",
             "error of event times / T",
-            "",
+            "hollow, at the top: wrong sequence of events",
             lambda line: (line.events.middle, line.errors.times) if line.events else None,
         ),
         _picture(
@@ -78,23 +72,19 @@ def _picture(
     panels = figure.subplots(rows, columns, squeeze=False).ravel()
     drawn: list[tuple[Any, list[tuple[float, float, str, str]]]] = []
     for panel, (name, lines) in zip(panels, found.items()):
-        points = []
+        points, beyond = [], []
         for line in lines:
             place = point(line) if line.method.shown else None
-            if place is None or not math.isfinite(place[1]):
+            if place is None or (line.errors.right is not False and not math.isfinite(place[1])):
+                continue
+            colour, marker, _ = _LOOKS[line.method.family]
+            face = "white" if line.errors.right is False else colour
+            looks = {"color": colour, "markersize": 5.5, "markerfacecolor": face, "zorder": 3}
+            if not math.isfinite(place[1]):
+                beyond.append((place[0], marker, looks, line.method.label))
                 continue
             x, y = place[0], max(place[1], _FLOOR)
-            colour, marker, _ = _LOOKS[line.method.family]
-            right = line.errors.right is not False
-            panel.plot(
-                x,
-                y,
-                marker,
-                color=colour,
-                markersize=5.5,
-                markerfacecolor=colour if right else "white",
-                zorder=3,
-            )
+            panel.plot(x, y, marker, **looks)
             points.append((x, y, line.method.label, colour))
         panel.set_xscale("log")
         panel.set_yscale("log")
@@ -106,6 +96,8 @@ def _picture(
             if numbers and max(numbers) < 12.0 * min(numbers):  # two numbers at least stand along the axis
                 low, high = math.log10(0.8 * min(numbers)), math.log10(1.25 * max(numbers))
                 bounds(10.0 ** math.floor(low), 10.0 ** math.ceil(high))
+        if beyond:
+            _at_the_top(panel, _ROOM * max((y for _, y, _, _ in points), default=1.0), beyond)
         style.dress(panel)
         panel.set_title(scenes[name].title, fontsize=10, loc="left")
         panel.xaxis.set_major_formatter(EngFormatter(unit="s", sep="\N{THIN SPACE}"))
@@ -145,6 +137,16 @@ def _picture(
     return style.save(figure, path)
 
 
+def _at_the_top(panel: Any, top: float, beyond: list[tuple[float, str, dict[str, Any], str]]) -> None:
+    """Marks of undefined errors at the top edge of a panel, and their names as a list, because they are close."""
+    panel.set_ylim(top=top)
+    beyond = sorted(beyond, key=lambda mark: mark[0])
+    for x, marker, looks, _ in beyond:
+        panel.plot(x, top, marker, **looks, clip_on=False)
+    names = "\n".join(["at the top, from the left:", *(label for *_, label in beyond)])
+    panel.text(0.99, 0.95, names, transform=panel.transAxes, ha="right", va="top", fontsize=8)
+
+
 def _name(panel: Any, points: Sequence[tuple[float, float, str, str]]) -> None:
     """Names beside their markers, where they cover neither a marker nor another name."""
     renderer = panel.figure.canvas.get_renderer()
@@ -153,6 +155,7 @@ def _name(panel: Any, points: Sequence[tuple[float, float, str, str]]) -> None:
     for x, y, _, _ in points:
         at = panel.transData.transform((x, y))
         taken.append((at[0] - 4 * pixels, at[1] - 4 * pixels, at[0] + 4 * pixels, at[1] + 4 * pixels))
+    taken += [text.get_window_extent(renderer).extents for text in panel.texts]
     frame = panel.get_window_extent(renderer)
     for x, y, label, colour in sorted(points, key=lambda p: -p[1]):
         best: Any = None

@@ -85,8 +85,9 @@ def shared_powers(quantities: Mapping[str, tuple[str, float, float]]) -> dict[st
         if base and size > 0 and math.isfinite(size):
             groups.setdefault(base[1], {})[name] = math.log10(size)
     powers: dict[str, int] = {}
-    for sizes in groups.values():
-        best = min(_PREFIXES, key=lambda power: (_misfit(power, sizes.values()), abs(power)))
+    for unit, sizes in groups.items():
+        usual = [power for power in _PREFIXES if power == 0 or _prefixed(unit, power) != unit]
+        best = min(usual, key=lambda power: (_misfit(power, sizes.values()), abs(power)))
         if len(sizes) > 1 and all(_LEAST <= size - best < _MOST for size in sizes.values()):
             powers |= dict.fromkeys(sizes, best)
     return powers
@@ -99,7 +100,9 @@ def _misfit(power: int, sizes: Iterable[float]) -> float:
 
 
 def _prefixed(unit: str, power: int) -> str:
-    return f"{_PREFIXES[power]}{unit}" if _TAKES_PREFIX.match(unit) else unit
+    """Return a unit with the prefix of a power of ten, or the unit alone if it takes no such prefix, as krad."""
+    is_large_angle = power > 0 and unit.startswith("rad")
+    return f"{_PREFIXES[power]}{unit}" if _TAKES_PREFIX.match(unit) and not is_large_angle else unit
 
 
 def scaled_unit(unit: str, low: float, high: float) -> tuple[int, str]:
@@ -107,14 +110,14 @@ def scaled_unit(unit: str, low: float, high: float) -> tuple[int, str]:
     size = max(abs(low), abs(high))
     power = 3 * math.floor(math.log10(size) / 3 + 1e-9) if size > 0 and math.isfinite(size) else 0
     power = min(max(power, -12), 9)
-    if power and _TAKES_PREFIX.match(unit):
-        return power, f"{_PREFIXES[power]}{unit}"
+    if _prefixed(unit, power) != unit:
+        return power, _prefixed(unit, power)
     return (0 if -3 <= math.log10(size or 1.0) < 4 else power), unit
 
 
 def with_prefix(value: float, unit: str) -> str:
     """Return a positive quantity as text, with a prefix if its unit takes one, such as "50 mm"."""
     power = min(max(3 * math.floor(math.log10(value) / 3 + 1e-9), -12), 9)
-    if power and _TAKES_PREFIX.match(unit):
+    if _prefixed(unit, power) != unit:
         return f"{value / 10.0**power:g} {_PREFIXES[power]}{unit_text(unit)}"
     return f"{value:g} {unit_text(unit)}"

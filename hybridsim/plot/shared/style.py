@@ -66,13 +66,15 @@ def head(axes: Axes, *parts: str, above: float = 0.0) -> None:
     axes.set_title(literal("\n".join(lines)), fontsize=10, loc="left", pad=_PAD + above)
 
 
-def point_along(axes: Axes, x: NDArray[np.float64], y: NDArray[np.float64], colour: str) -> None:
-    """Draw an arrow head halfway along a curve, in the direction of the curve."""
+def point_along(
+    axes: Axes, x: NDArray[np.float64], y: NDArray[np.float64], colour: str, share: float = 0.5
+) -> None:
+    """Draw an arrow head along a curve, at a share of its length, in the direction of the curve."""
     wide, high = (float(np.ptp(limits)) or 1.0 for limits in (axes.get_xlim(), axes.get_ylim()))
     lengths = np.hypot(np.diff(x) / wide, np.diff(y) / high)
     if lengths.size == 0 or not lengths.sum() > 0:
         return
-    k = int(np.searchsorted(np.cumsum(lengths), lengths.sum() / 2))
+    k = int(np.searchsorted(np.cumsum(lengths), share * lengths.sum()))
     while k + 1 < len(lengths) and lengths[k] == 0:
         k += 1
     axes.annotate(
