@@ -48,10 +48,10 @@ def test_a_small_matrix_fills_its_folder(hybridsim: Callable[..., Outcome], tmp_
     assert cells["box-from-the-side", "scipy-rk45"]["rows"][0][3] > 0
     written = {str(path.relative_to(tmp_path / "atlas")) for path in (tmp_path / "atlas").rglob("*.*")}
     assert written == {
-        "atlas.json", "matrix.png", "index.md", "events.md", "stick.md",
+        "atlas.json", "index.md", "events.md", "stick.md",
         "events/box-from-the-side.png", "stick/FREE-1.png",
     }  # fmt: skip
-    assert "wrote atlas/matrix.png" in outcome.err
+    assert "wrote atlas/index.md" in outcome.err
 
 
 def test_list_prints_the_scenes_by_class_and_runs_nothing(

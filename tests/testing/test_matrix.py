@@ -14,7 +14,6 @@ from integrators.tsitouras import Tsitouras
 
 import hybridsim as hs
 from hybridsim.errors import UsageError
-from hybridsim.plot.atlas import matrix
 from hybridsim.plot.atlas import scene as picture
 from hybridsim.testing import SCENES, clock, conformance_failures, measuring, outcome
 from hybridsim.testing import suite as suites
@@ -130,25 +129,17 @@ def test_json_is_read_back_as_it_was(small: Atlas) -> None:
     assert json.loads(small.to_json())["cells"][0]["verdict"] == "right"
 
 
-def test_every_cell_is_drawn(small: Atlas) -> None:
-    axes = matrix(small)
-    drawn = [text.get_text() for text in axes.texts]
-    assert drawn.count("✓") == sum(cell.verdict == "right" for cell in small.cells.values())
-    assert drawn.count("≠") == sum(cell.verdict == "wrong mode sequence" for cell in small.cells.values())
-    assert [label.get_text() for label in axes.get_xticklabels()] == [
-        one.name for one in small.configurations
-    ]
-
-
-def test_a_tall_matrix_has_its_names_at_both_ends(small: Atlas) -> None:
-    many = tuple(replace(small.scenes[0], name=f"s{k}") for k in range(50))
-    cells = {
-        (scene.name, one.name): small.cells[small.scenes[0].name, one.name]
-        for scene in many
-        for one in small.configurations
+def test_the_index_has_a_symbol_for_every_cell(small: Atlas) -> None:
+    """The number of each symbol is that of its verdict, and a row begins with a link to the scene."""
+    table = [line for line in pages(small)["index.md"].split("## Verdicts")[1].splitlines() if "|" in line]
+    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in table]
+    assert rows[0] == ["scene", *(one.name for one in small.configurations)]
+    symbols = {row[0].partition("]")[0].lstrip("["): row[1:] for row in rows if row[0].startswith("[")}
+    assert symbols == {
+        "FREE-1": ["✓", "**≠**", "✓", "**✗**", "✓"],
+        "SCI-cubic": ["✓", "✓", "**≠**", "", ""],
+        "box-from-the-side": ["✓", "✓", "**≠**", "", ""],
     }
-    for result, below in ((small, False), (Atlas(many, small.configurations, cells), True)):
-        assert matrix(result).xaxis.get_tick_params()["labelbottom"] is below
 
 
 def test_an_example_shows_the_true_motion_and_the_failing_one(small: Atlas) -> None:

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from hybridsim.testing.atlas import Atlas
 
 _FOLDER = Path("atlas")
-_MATRIX_DPI = 130.0  # the labels are small
 
 
 def add_to(commands: Any) -> None:
@@ -29,7 +28,7 @@ def add_to(commands: Any) -> None:
         description="Run benchmark problems (scenes) with known answers, with every integrator and with other common "
         "methods. Report for each pair: right, wrong answer, wrong mode sequence, hang (bounded by a time limit), or "
         "refused.",
-        epilog="The folder receives atlas.json, matrix.png, index.md, and a page and a folder of pictures for each "
+        epilog="The folder receives atlas.json, index.md with a table of all verdicts, and a page and a folder of pictures for each "
         "class. A full run takes about ten minutes on two processors.",
     )
     parser.add_argument("scenes", metavar="SCENE", nargs="*", help="run only these scenes (default: all)")
@@ -99,8 +98,7 @@ def execute(args: argparse.Namespace, session: Session) -> int:
 
 
 def _write(result: Atlas, folder: Path, session: Session, progress: Progress) -> None:
-    """Write data, matrix, pages and pictures; write only the data if the run was interrupted."""
-    from hybridsim.plot.atlas import matrix, save_small
+    """Write data, pages and pictures; write only the data if the run was interrupted."""
     from hybridsim.testing.atlas import pages
 
     folder.mkdir(parents=True, exist_ok=True)
@@ -108,8 +106,6 @@ def _write(result: Atlas, folder: Path, session: Session, progress: Progress) ->
     session.wrote(folder / "atlas.json")
     if result.interrupted:
         return
-    save_small(matrix(result), folder / "matrix.png", dpi=_MATRIX_DPI)
-    session.wrote(folder / "matrix.png")
     drawn = _pictures(result, folder, progress)
     for name, text in pages(result, drawn).items():
         write_text(folder / name, text)

@@ -1,4 +1,4 @@
-"""The pages of the atlas: an index with the matrix, and one page for each class of test cases."""
+"""The pages of the atlas: an index with a table of all verdicts, and one page for each class of test cases."""
 
 from __future__ import annotations
 
@@ -11,7 +11,17 @@ from hybridsim.testing.atlas.configurations import Configuration
 from hybridsim.testing.atlas.matrix import Atlas
 from hybridsim.testing.facts import CASES
 from hybridsim.testing.scene import TROUBLES, Scene
-from hybridsim.testing.verdict import ERROR, HANG, NOT_RUN, REFUSED, RIGHT, VERDICTS, WRONG, WRONG_SEQUENCE
+from hybridsim.testing.verdict import (
+    ERROR,
+    HANG,
+    NOT_RUN,
+    REFUSED,
+    RIGHT,
+    VERDICTS,
+    WRONG,
+    WRONG_ANSWER,
+    WRONG_SEQUENCE,
+)
 
 _WIDTH = 118
 
@@ -23,8 +33,6 @@ _INTRODUCTION = """\
 A scene is a model with a known answer. The answer is a closed form, or a number with at least 30 digits. The digits
 were computed by a program that shares no code with the package. The command `hybridsim atlas` runs all scenes with
 all methods.
-
-![scenes against integrators, a verdict for each pair](matrix.png)
 
 A method is *right* in a scene if it satisfies four conditions:
 
@@ -89,6 +97,9 @@ _QUESTIONS = {
     "sensitivity": "How accurate is a method if the motion amplifies its errors?",
 }
 _FAILURES = (*WRONG, HANG, ERROR)
+_SYMBOLS = {
+    RIGHT: "✓", WRONG_ANSWER: "**✗**", WRONG_SEQUENCE: "**≠**", HANG: "**∞**", REFUSED: "–", ERROR: "**!**", NOT_RUN: "",
+}  # fmt: skip
 _FAILURE = """A failure is a wrong answer, a wrong mode sequence, a hang or an error. A refused scene and a scene
 that is not run do not count as failures. The [first page of the atlas](index.md) explains the methods."""
 _LEAST_ORDER = 0.5  # smallest order that counts as convergence
@@ -108,20 +119,15 @@ def pages(result: Atlas, pictures: Collection[str] = ()) -> dict[str, str]:
 
 def index(result: Atlas, groups: Mapping[str, list[Scene]]) -> str:
     """Return the text of the index page."""
-    lines = [_INTRODUCTION.format(answer=_overall(result)), "| verdict | meaning |", "| --- | --- |"]
-    lines += [f"| {verdict} | {meaning} |" for verdict, meaning in VERDICTS.items()]
+    lines = [_INTRODUCTION.format(answer=_overall(result)), "| symbol | verdict | meaning |", "| --- | --- | --- |"]
+    lines += [f"| {_SYMBOLS[verdict]} | {verdict} | {meaning} |" for verdict, meaning in VERDICTS.items()]
     lines += ["", "## Classes of scenes", "", "| class | scenes | topic |", "| --- | --- | --- |"]
     for trouble, scenes in groups.items():
         name = trouble or "scenes"
         lines.append(
             f"| [{name}]({name}.md) | {len(scenes)} | {TROUBLES.get(trouble, '').partition(': ')[2]} |"
         )
-    lines += ["", "## Scenes", "", "| class | names |", "| --- | --- |"]
-    for trouble, scenes in groups.items():
-        name = trouble or "scenes"
-        links = ", ".join(f"[{one.name}]({name}.md#{anchor(one.title or one.name)})" for one in scenes)
-        lines.append(f"| {name} | {links} |")
-    lines += ["", _RUBBING]
+    lines += ["", "## Verdicts", "", *_matrix(result, groups), "", _RUBBING]
     shown = [verdict for verdict in VERDICTS if verdict != RIGHT]
     lines += ["", "## Integrators and other methods", ""]
     lines.append(f"| name | method | {RIGHT} | {' | '.join(shown)} |")
@@ -133,6 +139,19 @@ def index(result: Atlas, groups: Mapping[str, list[Scene]]) -> str:
     names = [trouble or "scenes" for trouble in groups]
     lines += ["", "```{toctree}", ":hidden:", "", *names, "```"]
     return "\n".join(lines) + "\n"
+
+
+def _matrix(result: Atlas, groups: Mapping[str, list[Scene]]) -> list[str]:
+    """Return a table of symbols of verdicts, with a row for each test case and a column for each method."""
+    names = [one.name for one in result.configurations]
+    lines = [f"| scene | {' | '.join(names)} |", "|" + " --- |" * (1 + len(names))]
+    for trouble, scenes in groups.items():
+        page = f"{trouble or 'scenes'}.md"
+        lines.append(f"| **{trouble or 'scenes'}** |" + " |" * len(names))
+        for scene in scenes:
+            symbols = " | ".join(_SYMBOLS[cell.verdict] for cell in result.row(scene))
+            lines.append(f"| [{scene.name}]({page}#{anchor(scene.title or scene.name)}) | {symbols} |")
+    return lines
 
 
 def anchor(title: str) -> str:
