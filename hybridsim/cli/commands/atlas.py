@@ -28,8 +28,8 @@ def add_to(commands: Any) -> None:
         description="Run benchmark problems (scenes) with known answers, with every integrator and with other common "
         "methods. Report for each pair: right, wrong answer, wrong mode sequence, hang (bounded by a time limit), or "
         "refused.",
-        epilog="The folder receives atlas.json, index.md with a table of all verdicts, and a page and a folder of pictures for each "
-        "class. A full run takes about ten minutes on two processors.",
+        epilog="The folder receives atlas.json, index.md with a table of all verdicts, and a page and a folder of "
+        "pictures for each class. A full run takes about ten minutes on two processors.",
     )
     parser.add_argument("scenes", metavar="SCENE", nargs="*", help="run only these scenes (default: all)")
     options.add(parser, "--class", "CLASS", "run only the scenes of this class", default="", dest="trouble")

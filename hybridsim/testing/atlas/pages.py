@@ -98,7 +98,8 @@ _QUESTIONS = {
 }
 _FAILURES = (*WRONG, HANG, ERROR)
 _SYMBOLS = {
-    RIGHT: "✓", WRONG_ANSWER: "**✗**", WRONG_SEQUENCE: "**≠**", HANG: "**∞**", REFUSED: "–", ERROR: "**!**", NOT_RUN: "",
+    RIGHT: "✓", WRONG_ANSWER: "**✗**", WRONG_SEQUENCE: "**≠**", HANG: "**∞**",
+    REFUSED: "–", ERROR: "**!**", NOT_RUN: "",
 }  # fmt: skip
 _FAILURE = """A failure is a wrong answer, a wrong mode sequence, a hang or an error. A refused scene and a scene
 that is not run do not count as failures. The [first page of the atlas](index.md) explains the methods."""
@@ -119,7 +120,11 @@ def pages(result: Atlas, pictures: Collection[str] = ()) -> dict[str, str]:
 
 def index(result: Atlas, groups: Mapping[str, list[Scene]]) -> str:
     """Return the text of the index page."""
-    lines = [_INTRODUCTION.format(answer=_overall(result)), "| symbol | verdict | meaning |", "| --- | --- | --- |"]
+    lines = [
+        _INTRODUCTION.format(answer=_overall(result)),
+        "| symbol | verdict | meaning |",
+        "| --- | --- | --- |",
+    ]
     lines += [f"| {_SYMBOLS[verdict]} | {verdict} | {meaning} |" for verdict, meaning in VERDICTS.items()]
     lines += ["", "## Classes of scenes", "", "| class | scenes | topic |", "| --- | --- | --- |"]
     for trouble, scenes in groups.items():
