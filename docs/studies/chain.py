@@ -157,8 +157,8 @@ After an event hybridsim restarts only the few neighbouring blocks whose series 
 tolerance. At the end of a step hybridsim expands the series of all blocks, once for all events of the step. The other
 methods restart all blocks at each event. For the other methods the cost of an event is therefore proportional to n.
 {verdict} hybridsim and heyoka control their error. RK4 with h = {STEP:g} has no error control. When RK4 releases a
-block, it changes the speed of the block by 1e-14. Otherwise the block would stop again at once. The program siconos
-was not run, because PyPI has no wheel of siconos (`pip download siconos` finds no version).
+block, it changes the speed of the block by 1e-14. Otherwise the block would stop again immediately. The program
+siconos was not run, because PyPI has no wheel of siconos (`pip download siconos` finds no version).
 """
 
 

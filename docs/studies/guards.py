@@ -176,9 +176,9 @@ another event.
 - For `exact` the guard g is a random sum of terms that linear modes can produce. The guards are polynomials up to
   degree six, sums of two sines, or motions of a damped driven oscillator. Some guards are the sum of two
   exponentials, a sine and t exp(-e t).
-- For `taylor` the guard g is a product of factors, which have up to five zeros in all. The factors are polynomials
-  or trigonometric functions of t or of a state. The product also has two positive factors. One of these factors
-  depends on a state with a nonlinear rate.
+- For `taylor` the guard g is a product of factors. Together the factors have up to five zeros. The factors are
+  polynomials or trigonometric functions of t or of a state. The product also has two positive factors. One of these
+  factors depends on a state with a nonlinear rate.
 
 Most guards have one or two minima or maxima close to zero. The distance of such an extreme value from zero is
 called the *depth*. If g turns back after it has passed zero, there is a *pair* of zeros. Two zeros closer than 1 %

@@ -249,7 +249,7 @@ help. The method `rk4-sign` may need ten times as many steps as the published se
 ![How the boundary moves with r and F0/N](../images/stability-moves.png)
 
 *On each line the error of the amplitude is 1 %. For some zones nearly as wide as the largest speed, tanh has two
-lines, one above the other. Between these lines the error changes its sign, so a run is right there by accident.*
+lines, one above the other. Between these lines the error changes its sign, so a run between them is right by accident.*
 
 If the velocity is set to zero, the limit of the zone is an almost constant share of the largest speed. This share is
 9 to 15 % if the body sticks, and 1 to 2 % if the body only reverses. If the velocity is kept, the limit is 0.2 to
