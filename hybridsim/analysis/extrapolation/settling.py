@@ -29,7 +29,7 @@ from hybridsim.analysis.extrapolation.period_map import PeriodMap
 from hybridsim.analysis.steady.approach import followed, is_near
 from hybridsim.analysis.steady.motion import Point
 from hybridsim.analysis.steady.settling import Passings, relative
-from hybridsim.ensemble.nearness import CLOSE, LINEAR
+from hybridsim.ensemble.nearness import CLOSE, LINEAR, MOST
 from hybridsim.errors import SimulationError
 
 _EVERY = 4  # periods between tests
@@ -116,12 +116,13 @@ class Settling:
             if not self._end_trial(passings.scale):
                 continue
             multiple = 1 if rests else self._multiple(passings)
-            if multiple is not None and self._is_reached(passings, multiple):
-                return Settled(passings, multiple, rests, self.extrapolations)
+            if multiple is not None:
+                if self._is_reached(passings, multiple):
+                    return Settled(passings, multiple, rests, self.extrapolations)
+                continue
             if self.map.periods >= self.max_periods:
                 return Settled(passings, None, False, self.extrapolations)
-            if multiple is None:
-                self._extrapolate(passings.scale)
+            self._extrapolate(passings.scale)
 
     def _multiple(self, passings: Passings) -> int | None:
         """Return the number of periods after which the motion repeats, or None while this number is not certain."""
@@ -208,20 +209,22 @@ class Settling:
         if not (self.extrapolations and self._may_extrapolate):
             return True
         distance = 0.0 if self._plain is None else self._follow_plain(passings.scale, multiple)
-        if distance < math.inf and not grows(self.map, passings.scale, multiple, self._slowest):
+        is_repelled = distance < math.inf and grows(self.map, passings.scale, multiple, self._slowest)
+        if distance < math.inf and not is_repelled:
             return True
         if distance > CLOSE:
             self.map.restore(self._plain)
         else:
             self._may_extrapolate = False  # the map goes on from the changed states
         self._plain, self._states, self._pairs, self._fresh, self._events = None, [self.map.x], [], 0, b""
-        self._wait, self._waited, self._is_exhausted = self.map.periods, 0, False
+        self._wait, self._waited, self._is_exhausted = self.map.periods if is_repelled else 0, 0, False
         return False
 
     def _follow_plain(self, scale: np.ndarray, multiple: int) -> float:
-        """Return the distance of the plain periods from the present motion at their end, or infinity without approach.
+        """Return the distance from which plain periods approach the present motion, or infinity if they do not.
 
-        They continue from the states before the first extrapolation. The map returns to its present states.
+        They continue from the states before the first extrapolation, at most until the number of periods has doubled.
+        The map returns to its present states.
         """
         orbit = []
         for _ in range(multiple):
@@ -229,27 +232,33 @@ class Settling:
             orbit.append((self.map.changes, self.map.x))
         present = self.map.snapshot()
         self.map.restore(self._plain)
-        states = [self.map.x]
+        most = max(min(2 * self.map.periods, self.max_periods), self.map.periods + MOST)
 
         def distance(x: np.ndarray) -> float:
             return min(relative(x - y, scale) for _, y in orbit)
 
         def step() -> float | None:
-            try:
-                self.map.advance()
-            except SimulationError:
-                return None
+            self.map.advance()
             self._plain = self.map.snapshot()
             states.append(self.map.x)
             return distance(self.map.x) if any(self.map.changes == word for word, _ in orbit) else None
 
-        distances = followed(step, distance(self.map.x))
+        found = math.inf
+        while found == math.inf and self.map.periods < most:
+            states = [self.map.x]
+            try:
+                distances = followed(step, distance(self.map.x))
+            except SimulationError:  # plain periods end here
+                break
+            if distances and (is_near(distances) or self._leads(states[::-multiple], scale, distance)):
+                found = distances[-1]
         self.map.restore(present)
-        if not distances:
-            return math.inf
-        if is_near(distances):
-            return distances[-1]
-        repeated = np.array(states[(len(states) - 1) % multiple :: multiple])
-        limit, _ = limit_of(repeated[:-1], repeated[1:], scale)
-        left = _HALF if self._is_squared else LINEAR
-        return distances[-1] if distance(limit) <= left * distances[-1] else math.inf
+        return found
+
+    def _leads(
+        self, latest: list[np.ndarray], scale: np.ndarray, distance: Callable[[np.ndarray], float]
+    ) -> bool:
+        """Return whether the limit of states at repeated periods, the latest first, is much closer to a motion."""
+        states = np.array(latest[::-1])
+        limit, _ = limit_of(states[:-1], states[1:], scale)
+        return distance(limit) <= (_HALF if self._is_squared else LINEAR) * distance(states[-1])
