@@ -231,11 +231,11 @@ def page(
         "(../images/advice-map.png)",
         "",
         "*The map shows the answers of `advise` on a grid with N = 40 N. Below F0 = 20 N nothing moves. For "
-        "motions with stops, the simplest adequate model is usually Karnopp's model. Its v0 is 1 % of the "
-        "largest speed. At some frequencies the simplest adequate model is friction regularized by tanh or "
-        "arctan, with the same v0. Runs of these three models take at least as long as runs of the full "
-        "model. For motions without stops, Den Hartog's formula is exact. Near resonance equivalent viscous "
-        "damping is adequate.*",
+        "motions with stops, the simplest adequate model is usually Karnopp's model. The v0 of this model "
+        "is 1 % of the largest speed. At some frequencies the simplest adequate model is friction "
+        "regularized by tanh or arctan, with the same v0. Runs of these three models take at least as long "
+        "as runs of the full model. For motions without stops, Den Hartog's formula is exact. Near "
+        "resonance equivalent viscous damping is adequate.*",
         "",
     ]
     return "\n".join(lines)

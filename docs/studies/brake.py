@@ -182,7 +182,7 @@ speed. The script `python docs/studies/brake.py` finds the onset in three ways:
 
 The last two columns are the largest differences from the closed form between mu = {FRICTION[0]:g} and
 {FRICTION[-1]:g}. The differences are largest at mu = 3/4. At mu = 3/4 two eigenvalues are equal. A small error of
-the matrix then changes them by the square root of this error.
+the matrix then changes both eigenvalues by the square root of this error.
 
 ![Growth of a small disturbance, and the final amplitude, over the coefficient of friction](../images/brake.png)
 

@@ -141,8 +141,8 @@ of {COUPLING}. The friction force at the slip velocity v is 1/(1 + {DELTA:g}|v|)
 random. The script `python docs/studies/chain.py` runs the methods in turn several times. The table contains the
 shortest time of each method. Every run finished. {machine()}
 
-When the study began, other programs used {load:.1f} of {os.cpu_count()} processors. Those other programs made all
-times longer. Ratios of times are uncertain by a factor of two.
+When the study began, other programs used {load:.1f} of {os.cpu_count()} processors. Programs that ran at the same
+time made all times longer. Ratios of times are uncertain by a factor of two.
 
 The table gives milliseconds per unit of simulated time. The number in brackets is the largest error of a state after
 {JUDGED:g} units of time. The reference is a run of hybridsim at rtol 1e-13.

@@ -143,7 +143,7 @@ def pairs(seeds: list[int]) -> tuple[Counter[str], Counter[tuple[str, str]]]:
 HEAD = """# Combined forms
 
 Do runs of models with many combined features agree with an independent solver? Of {runs} runs, {agree} agree with
-this solver and {differ} differ from it. The tables below list all runs that do not agree.
+the independent solver and {differ} differ from it. The tables below list all runs that do not agree.
 
 `python docs/studies/combined_forms.py` draws whole models at random. The script compares each run with an
 independent solver, which shares no code with hybridsim. On this page this solver is called *the judge*. A *form* is
@@ -169,11 +169,11 @@ forms are possible.
 
 *The judge* (`tests/reference/combined`) reads an abstract form of the model, and not the model file. The judge
 computes the motion by Taylor series for each combination of modes. The judge finds zeros by dense sampling and
-bisection. At an instant with an event it tries every combination of modes and of branches of `abs`, `min`, `max` and
-conditionals. A combination is admissible if its conditions are true just after the instant. The judge also finds
-impulses by trying all combinations. If a run disagrees, the judge computes the motion again in 40 digits. A run is
-compared only as long as the motion is certain. The comparison ends if a guard comes closer to zero than 1e-6 and
-turns back. The comparison also ends if the rules permit several motions.
+bisection. At an instant with an event the judge tries every combination of modes and of branches of `abs`, `min`,
+`max` and conditionals. A combination is admissible if its conditions are true just after the instant. The judge also
+finds impulses by trying all combinations. If a run disagrees, the judge computes the motion again in 40 digits. A
+run is compared only as long as the motion is certain. The comparison ends if a guard comes closer to zero than 1e-6
+and turns back. The comparison also ends if the rules permit several motions.
 
 A run *agrees* if two conditions are met. First, at {points} times all states and discrete states differ from those of
 the judge by at most {allowed:g} of the size of the motion. Second, all monitors fire as often as with the judge. Two

@@ -98,8 +98,8 @@ The base of a contact is at rest or moves. The applied forces are harmonic. Each
 rtol {RTOL:g}.
 
 At each event the script tries all combinations of stick, slip forward and slip backward for the contacts at rest.
-For each combination it computes the accelerations, the forces and two time derivatives of the forces. The script
-solves the whole system of equations in 40 digits. hybridsim uses another method, with a Delassus operator and
+For each combination the script computes the accelerations, the forces and two time derivatives of the forces. The
+script solves the whole system of equations in 40 digits. hybridsim uses another method, with a Delassus operator and
 pivoting. The combination that hybridsim selects must be admissible.
 
 Each system also runs with its coordinates and contacts declared in {ORDERS} other orders. The columns "orders

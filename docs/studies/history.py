@@ -412,8 +412,9 @@ times at which the process makes the compared runs:
 - *On a thread* means that all integrators run at the same time on one thread each. Two further threads make other
   runs.
 
-The reference is the same run in a new process. The new process makes no other run. At its start the cache of
-compiled models is empty. The last column of the table is for a new process that uses the cache of the process with
+The reference is the same run in a new process. The new process makes no other run. The cache of compiled models is
+empty when the new process starts. The last column of the table is for a new process that uses the cache of the
+process with
 {runs} runs. All results are compared bit for bit. The comparison includes the status, the message, the warnings, all
 steps, and the dense output at {points} times. The comparison also includes the events, with the states before and
 after them.

@@ -239,9 +239,9 @@ runs, whose starts are shifted by equal parts of a step. All other results of th
 {published}
 
 If the velocity is set to zero, the published setting is right in every case. The published zone is at most 4 % of
-the largest speed. In the case with 4 %, even a zone of 11 % would be right. If the velocity is kept, as in Eq. 4 of
-the paper, the setting is right for a body that never sticks. With the kept velocity it is also right for r = 0.6
-with F0/N = 0.75 and above. This setting is wrong in every other case. The error grows towards the threshold of
+the largest speed. In the case with a zone of 4 %, even a zone of 11 % would be right. If the velocity is kept, as in
+Eq. 4 of the paper, the setting is right for a body that never sticks. With the kept velocity it is also right for r
+= 0.6 with F0/N = 0.75 and above. This setting is wrong in every other case. The error grows towards the threshold of
 motion, where the map of the paper has its largest values. For tanh with v0 = 8e-4 m/s, half of the results are
 wrong. The method `rk4-dichotomy` needs only a fifth of the 1200 steps. If the zone is too wide, more steps do not
 help. The method `rk4-sign` may need ten times as many steps as the published setting.
@@ -253,9 +253,9 @@ lines, one above the other. Between these lines the error changes its sign, so a
 
 If the velocity is set to zero, the limit of the zone is an almost constant share of the largest speed. This share is
 9 to 15 % if the body sticks, and 1 to 2 % if the body only reverses. If the velocity is kept, the limit is 0.2 to
-0.8 %. It is smallest for long sticks. For tanh the limit is 0.15 % to 2.3 %, and follows no such rule. In m/s, a
-limit is smaller if the largest speed is smaller. An example is the case r = 0.6. If F0/N decreases from 0.75 to
-0.54, the limit for the velocity set to zero decreases from 0.034 to 0.0022 m/s. The limit for the kept velocity
+0.8 %. This limit is smallest for long sticks. For tanh the limit is 0.15 % to 2.3 %, and follows no such rule. In
+m/s, a limit is smaller if the largest speed is smaller. An example is the case r = 0.6. If F0/N decreases from 0.75
+to 0.54, the limit for the velocity set to zero decreases from 0.034 to 0.0022 m/s. The limit for the kept velocity
 decreases from 1.8e-3 to 4e-5 m/s.
 
 ![Error of rk4-sign over the step](../images/stability-sign.png)

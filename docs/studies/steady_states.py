@@ -219,9 +219,9 @@ agrees with a plain run. At {irregular} further points both methods find a motio
 had not settled at the end of the plain run. At {refused} points both methods find no steady state. The results
 differ at {differ} of the points.
 
-`python docs/studies/steady_states.py` draws the numbers of {kinds} kinds of models at random. For each point it
-compares two results. One result is that of `hs.steady_state` with at most {most} periods. The other result is that
-of plain runs (`docs/studies/steady_brute.py`), which use `hs.simulate` and nothing of `hybridsim.analysis`. The
+`python docs/studies/steady_states.py` draws the numbers of {kinds} kinds of models at random. For each point the
+script compares two results. One result is that of `hs.steady_state` with at most {most} periods. The other result is
+that of plain runs (`docs/studies/steady_brute.py`), which use `hs.simulate` and nothing of `hybridsim.analysis`. The
 plain runs use `dop853` with the tolerance {rtol:g}.
 
 - A plain run has {short}, then {middle}, then {long} periods of the forcing, and ends earlier if the motion repeats.
@@ -239,10 +239,10 @@ The amplitudes and periods agree if their relative difference is at most {equal:
 the coefficients of their characteristic polynomials. These coefficients may differ by at most {equal_multipliers:g}
 times the product of 1 + s, over the singular values s of the matrix. The fractions of time in stick are compared
 too. At
-{swept} points with a periodic motion `hs.sweep` returned the amplitude of the plain run. The function
-`hs.frequency_response` returned it at {responses} points. At {scipy} points a program that uses only SciPy
-(`solve_ivp` with events) found the same amplitude and the same fraction of stick. A mechanical system is compared
-with its ordinary model. The multipliers of
+{swept} points with a periodic motion `hs.sweep` returned the amplitude of the plain run. At {responses} points
+`hs.frequency_response` returned this amplitude too. At {scipy} points a program that uses only SciPy (`solve_ivp`
+with events) found the same amplitude and the same fraction of stick. A mechanical system is compared with its
+ordinary model. The multipliers of
 {multipliers} points are compared.
 
 | kind of model | points | agree | do not repeat | had not settled | no steady state | differ |

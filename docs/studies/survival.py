@@ -237,8 +237,8 @@ the states before and after them.
 
 ## Killed
 
-A sweep of {points} points runs in a separate process. Without interruption it took {seconds:.1f} s. SIGKILL ended
-the process {kills} times at random times. Each time the sweep was started again. In {begun} cases the sweep
+A sweep of {points} points runs in a separate process. Without interruption the sweep took {seconds:.1f} s. SIGKILL
+ended the process {kills} times at random times. Each time the sweep was started again. In {begun} cases the sweep
 finished before the kill. After such a finish the sweep started again without a journal. The process writes each
 point to a log file before it computes the point.
 

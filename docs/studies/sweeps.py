@@ -90,7 +90,7 @@ def page(
     )
     statuses = [f"| {number} | {status} |" for status, number in others.most_common()]
     kinds = ", ".join(
-        f"{number} {kind}" for kind, number in Counter(map(str, here["kind"][~here.failed])).most_common()
+        f"{kind} ({number})" for kind, number in Counter(map(str, here["kind"][~here.failed])).most_common()
     )
     rates = [
         f"| {sweep.executor} | {sweep.wall_time:.0f} | {count / sweep.wall_time:.0f} |"
@@ -137,7 +137,7 @@ def page(
             "",
             "## Other points",
             "",
-            f"The other points have motions of these kinds: {kinds}.",
+            f"The motions at the other points are of these kinds: {kinds}.",
             "",
             "| points | status |",
             "| --- | --- |",

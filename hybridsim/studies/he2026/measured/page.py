@@ -89,8 +89,8 @@ figure of the paper again. The integrator `rk4-dichotomy` is our implementation 
 stick-slip. The integrator `rk4-sign` is our implementation of the method without stick-slip. The paper leaves
 details of the methods open. A *reading* is one choice of these details. The study compares the results of the
 readings with the exact motion, which `exact` computes. The sections after the claims give results that do not
-depend on a step. These sections show which motions stop, and for how long. They also show the errors of models
-without stops.
+depend on a step. These sections show which motions stop, and for how long. The sections also show the errors of
+models without stops.
 
 | figure | claim | verdict |
 | --- | --- | --- |
@@ -184,7 +184,7 @@ def _truth(study: Study, image: Callable[[str], str]) -> str:
             + ", ".join(f"{name} {_percent(share)}" for name, share in within.items())
             + ". Den Hartog's closed form needs no simulation. The error of this form is below 1 % if less than "
             + _percent(facts["stick fraction below which the closed form without stops is within 1 %"])
-            + " of the period is stick. It is below 5 % if less than "
+            + " of the period is stick. The error is below 5 % if less than "
             + _percent(facts["stick fraction below which the closed form without stops is within 5 %"])
             + " of the period is stick.",
             "",
