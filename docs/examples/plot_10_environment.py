@@ -116,7 +116,7 @@ for rule in (constant, soft):
         f"{rule.__name__}: the bit stops {stops[rule.__name__]} times, {observation[2]:.2f} rad/s at the end"
     )
 
-figure, axes = plt.subplots()
+figure, axes = plt.subplots(layout="constrained")
 for name, values in speeds.items():
     axes.plot(DrillEnv.period * np.arange(1, len(values) + 1), values, label=name)
 axes.set(xlabel="t in s", ylabel="speed of the bit in rad/s")

@@ -8,9 +8,11 @@ in time is H. Between these points both values are constant. The reference is a 
 is of first order in H.
 """
 
+import matplotlib.pyplot as plt
 import numpy as np
 
 import hybridsim as hs
+from hybridsim import plot
 
 parameters = {"m": 1, "k": 40, "N": 4, "belt": 0.5}
 friction = {"law": "coulomb", "arguments": {"mu": 0.3}, "normal": "N"}
@@ -55,15 +57,23 @@ def coupled(end, points):
 
 truth = hs.simulate(whole, (0, 1.0), integrator="exact")
 expected = np.array([truth.y[0, -1], truth.y[2, -1]])
-errors = []
+distances, errors = [], []
 for points in (300, 600, 1200, 2400):
     found, events = coupled(1.0, points)
+    distances.append(1.0 / points)
     errors.append(np.abs(found - expected).max())
     print(
-        f"H = {1.0 / points:.5f}: error {errors[-1]:.2e}, {len(events)} events; the whole has {len(truth.events)}"
+        f"H = {distances[-1]:.5f}: error {errors[-1]:.2e}, {len(events)} events; the whole has {len(truth.events)}"
     )
 
 # %%
 # If H is halved, the error is halved too.
 
 print("ratios", np.round(np.array(errors[:-1]) / errors[1:], 2))
+
+figure, axes = plt.subplots(layout="constrained")
+axes.loglog(distances, errors, "o-", label="two simulators")
+axes.loglog(distances, errors[-1] * np.array(distances) / distances[-1], "--", label="first order in H")
+axes.set(xlabel="H", ylabel="error of the positions at t = 1")
+axes.legend()
+plot.save(axes, "cosimulation.png")

@@ -63,7 +63,7 @@ def draw_domains() -> None:
         for at in events:
             axes.plot(at, 0, marker="v", color=ORANGE, markersize=10, zorder=6)
         outcome = f"ends at t = {events[0]:.1f}" if events else "goes on"
-        is_seen = values[0] >= 0 > values[-1]
+        is_seen = np.sign(values[0]) != np.sign(values[-1])
         test = "right" if is_seen == bool(events) else "wrong"
         axes.set_title(f"{title}:\nmode {outcome}; test of signs {test}", fontsize=9, loc="left")
         axes.set_ylim(-0.45, 0.75)

@@ -9,10 +9,11 @@ from sphinx.util.osutil import relative_uri
 
 
 def add(app: Any, document: nodes.document, page: str) -> None:
-    """Put each picture of a page that is not yet in a link into a link, and pictures of examples into a box."""
+    """Put each picture of a page that has no link into a link to its file, and pictures of examples into a box."""
     start = app.builder.get_target_uri(page)
     for image in list(document.findall(nodes.image)):
-        if image["uri"] not in app.env.images or isinstance(image.parent, nodes.reference):
+        is_thumbnail = "/thumb/" in image["uri"]  # it is below a link to its example
+        if image["uri"] not in app.env.images or isinstance(image.parent, nodes.reference) or is_thumbnail:
             continue
         target = relative_uri(start, f"_images/{app.env.images[image['uri']][1]}")
         image.replace_self(

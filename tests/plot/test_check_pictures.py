@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import importlib
+import re
 import sys
 from dataclasses import replace
 from math import nan
@@ -81,6 +82,30 @@ def test_a_picture_of_the_atlas_writes_numbers_of_events_and_draws_no_empty_stri
     assert figure.axes[0].get_ylabel() == "y [$10^{-9}$]"
     none = replace(right, events=np.array([]))
     assert len(style.figure_of(scene(Example("y", "", none, None, ()))).axes) == 1
+
+
+def test_the_caption_of_the_guards_agrees_with_their_picture() -> None:
+    """The page says that a comparison of signs is wrong in the third and in the fourth case."""
+    svg = (IMAGES / "event-domain.svg").read_text(encoding="utf-8")
+    assert re.findall(r"test of signs (\w+)", svg) == ["right", "right", "wrong", "wrong"]
+    page = (DOCS / "explanation" / "events.md").read_text(encoding="utf-8")
+    assert "is wrong in two of the four cases" in " ".join(page.split())
+
+
+def test_pictures_become_links_except_thumbnails_of_examples() -> None:
+    """A thumbnail lies below the link to its example, which a second link would displace."""
+    pytest.importorskip("sphinx")
+    nodes = importlib.import_module("docutils.nodes")
+    links = importlib.import_module("picture_links")
+    uris = ("images/one.png", "gallery/images/thumb/two.png")
+    document = nodes.section("", *(nodes.image(uri=uri) for uri in uris))
+    app = SimpleNamespace(
+        builder=SimpleNamespace(get_target_uri=lambda page: f"{page}.html"),
+        env=SimpleNamespace(images={uri: (set(), Path(uri).name) for uri in uris}),
+    )
+    links.add(app, document, "page")
+    assert [type(node) for node in document.children] == [nodes.reference, nodes.image]
+    assert document.children[0]["refuri"] == "_images/one.png"
 
 
 def test_methods_with_undefined_errors_are_at_the_top_of_the_chart_of_speed(tmp_path: Path) -> None:
