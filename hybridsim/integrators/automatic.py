@@ -10,12 +10,11 @@ from hybridsim.engine.events.monitor_corners import corners_of_monitors
 from hybridsim.engine.events.outcome import Situation
 from hybridsim.engine.events.resolve import EventResolution
 from hybridsim.engine.linear.modes import is_linear_beside_corners, what_is_not_linear
-from hybridsim.engine.series.interpreter import advance
 from hybridsim.engine.system.instant import Instant
 from hybridsim.engine.system.system import System
 from hybridsim.engine.system.user_functions.code import PythonCode
 from hybridsim.integrators.contract import Integrator
-from hybridsim.integrators.rosenbrock.step import linearise
+from hybridsim.integrators.rosenbrock.step import Linearisation
 
 _SMALL = 24  # largest number of states and guards with small tables of closed forms
 _TIGHT = 1e-10  # rtol below which series of high order are fastest
@@ -131,18 +130,8 @@ def _eigenvalues(system: System, x: np.ndarray, z: np.ndarray, t0: float) -> np.
     if not system.n:
         return none
     p = system.vector(Instant(t0), system.discrete_start)
-    jacobian = _jacobian(system, x, p, z) if system.has_tape else system.jacobian(0.0, x, p, z)
+    if system.has_tape:
+        jacobian, _ = Linearisation(system, p, z).at(0.0, x)
+    else:
+        jacobian = system.jacobian(0.0, x, p, z)
     return np.linalg.eigvals(jacobian) if np.isfinite(jacobian).all() else none
-
-
-def _jacobian(system: System, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """Return the Jacobian d(dx/dt)/dx of the flow at a state."""
-    n, inputs, tape = system.n, system.registers.inputs, system.optimised_tape(z)
-    V = np.zeros((system.registers.count, 2))
-    V[inputs.constants, 0] = inputs.values[:, 0]
-    V[inputs.parameters, 0] = p[inputs.sources]
-    advance(tape.constant_rows, V, 0)
-    jacobian, rate = np.empty((n, n)), np.empty(n)
-    flow_registers = (int(inputs.time[0]), inputs.states, tape.derivatives)
-    linearise(tape.rows, flow_registers, 0.0, x, V, jacobian, rate)
-    return jacobian

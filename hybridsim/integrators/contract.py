@@ -83,6 +83,10 @@ __all__ = [
 ]
 
 NEEDS_TAPE = "it needs rates that are declared as expressions"  # reason for lacks["functions"]
+EXPLICIT = {"stiff": "it is explicit: the fastest rate limits its step"}  # entries of lacks
+RESTARTED = {
+    "accumulation": "it does not resolve events closer than its tolerances, since each restart is at order one"
+}
 CAPABILITIES = {
     "contacts": "contacts with dry friction that stick",
     "located": "events of contacts are located, with their right number and order",

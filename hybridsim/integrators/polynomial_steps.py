@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from collections.abc import Sequence
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -19,9 +18,8 @@ from hybridsim.engine.events.compiled.scratch import called_by, note_or_restore
 from hybridsim.engine.native.kernels import call as call_function
 from hybridsim.engine.native.kernels import call_noinline, call_series, inlined, kernel
 from hybridsim.engine.native.loop_hints import put
-from hybridsim.engine.native.struct_pack import packed, replaced
-from hybridsim.engine.record.series_block import SeriesBlock
-from hybridsim.engine.roots.dense_guards import first_guard
+from hybridsim.engine.native.struct_pack import packed
+from hybridsim.engine.roots.dense_guards import first_guard, guard_search
 from hybridsim.engine.run.event_loop import (
     FOLLOWED,
     FULL,
@@ -33,7 +31,7 @@ from hybridsim.engine.run.event_loop import (
     load_constants,
     not_followed,
 )
-from hybridsim.engine.run.method_kernels import MethodKernels, StepRows
+from hybridsim.engine.run.method_kernels import StepKernels
 from hybridsim.engine.series.interpreter import advance
 from hybridsim.engine.system.programs.code_cache import ends_codes
 from hybridsim.engine.system.programs.guard_parts import guard_parts_of
@@ -60,39 +58,18 @@ class PolynomialArrays(NamedTuple):
     polynomial: np.ndarray  # (n, degree + 1), states in powers of the time since the start of the step
     guards: np.ndarray  # (G, TERMS), Taylor coefficients of the active guards along the flow
     x: np.ndarray  # (n, TERMS), the same of the states
-    V: np.ndarray  # (R, order + 1), series along the polynomial; the next arrays belong to `first_guard`
-    W: np.ndarray  # (R, order + 1), values and series at points
-    states: np.ndarray
-    guard_series: np.ndarray
-    a: np.ndarray
-    b: np.ndarray
-    stack: np.ndarray
-    powers: np.ndarray
-    values: np.ndarray
-    sums: np.ndarray
-    totals: np.ndarray
-    floors: np.ndarray
-    ahead: np.ndarray
-    rates: np.ndarray
-    everyone: np.ndarray
-    guard_registers: np.ndarray
-    sides: np.ndarray
-    orders: np.ndarray
-    bernstein: np.ndarray
+    search: Any  # `hybridsim.engine.roots.dense_guards.GuardSearch`
 
 
-class PolynomialKernels(MethodKernels):
+class PolynomialKernels(StepKernels):
     """The kernels of a method whose steps have polynomials of one degree as dense output."""
 
-    rows = StepRows
     degree: ClassVar[int]
 
     def __init__(self, system: System, tolerances: Tolerances, longest: float) -> None:
-        super().__init__(system, longest)
-        self.tolerances, degree = tolerances, self.degree
-        self.order = max(short_order(tolerances.rtol), degree + 2)
+        super().__init__(system, longest, self.degree + 1)
+        self.tolerances, self.order = tolerances, max(short_order(tolerances.rtol), self.degree + 2)
         self.kind = f"{type(self).__module__}.{type(self).__qualname__}, order {self.order}"
-        self.columns = system.n * (degree + 1) + 2
         self.parts, self.codes = guard_parts_of(system), ends_codes(system, TERMS, TERMS, self.order)
 
     @abstractmethod
@@ -101,47 +78,27 @@ class PolynomialKernels(MethodKernels):
 
     def arrays(self) -> PolynomialArrays:
         """Return new arrays for one call of the compiled loop."""
-        system, n, columns = self.system, self.system.n, self.order + 1
-        tapes, guards, whole = tape_cache_of(system).tapes, system.guard_count, np.int64
+        system, n = self.system, self.system.n
         arrays: PolynomialArrays = packed(
             PolynomialArrays(
                 method=packed(self.method_arrays()),
-                parts=self.parts.of(tapes),
-                codes=self.codes.of(tapes),
+                **self.of_tapes(tape_cache_of(system).tapes),
                 control=np.empty(2),
                 atol=np.empty(n),
-                counts=np.zeros(6, dtype=whole),
+                counts=np.zeros(6, dtype=np.int64),
                 polynomial=np.empty((n, self.degree + 1)),
-                guards=np.empty((guards, TERMS)),
+                guards=np.empty((system.guard_count, TERMS)),
                 x=np.empty((n, TERMS)),
-                **{name: np.zeros((system.registers.count, columns)) for name in ("V", "W")},
-                states=np.empty((n, columns)),
-                guard_series=np.empty((guards, columns)),
-                **{name: np.empty(columns) for name in ("a", "b")},
-                stack=np.empty((64, columns + 2)),
-                powers=np.empty(columns + 1),
-                **{name: np.empty(guards) for name in ("values", "sums", "totals", "floors")},
-                **{name: np.empty(n) for name in ("ahead", "rates")},
-                everyone=np.arange(guards, dtype=whole),
-                **{name: np.empty(guards, dtype=whole) for name in ("guard_registers", "sides", "orders")},
-                bernstein=np.zeros(0, dtype=whole),
+                search=guard_search(system, self.order),
             )
         )
         return arrays
-
-    def fields(self) -> Sequence[tuple[Any, tuple[int, ...]]]:
-        """Return the dtype and the shape of a row of each array in `rows`."""
-        return (float, (2,)), (float, (self.system.n, self.degree + 1))
 
     def begin(self, own: PolynomialArrays, tapes: Tapes) -> Any:
         """Write the settings of the run to the arrays, and return the arrays."""
         own.control[RTOL], own.control[MAX_STEP] = self.tolerances.rtol, self.tolerances.max_step
         own.atol[:], own.counts[:] = self.tolerances.atol, 0
         return self.with_tapes(own, tapes)
-
-    def with_tapes(self, own: PolynomialArrays, tapes: Tapes) -> Any:
-        """Return the arrays with the guard instructions and the machine code of the instruction tapes."""
-        return replaced(own, parts=self.parts.of(tapes), codes=self.codes.of(tapes))
 
     def end(self, own: PolynomialArrays, tapes: Tapes, lin: Any) -> Any:
         """Return the numbers of evaluated rates and of rejected steps."""
@@ -152,10 +109,6 @@ class PolynomialKernels(MethodKernels):
         """Add the cost of the steps to the counters."""
         counters.rhs_evaluations += result[TRIED]
         counters.rejected += result[REJECTED]
-
-    def block(self, result: Any, rows: StepRows, last_steps: np.ndarray, *record: np.ndarray) -> SeriesBlock:
-        """Return the segments that one call of the compiled loop has stored."""
-        return SeriesBlock(self.recorded, last_steps, *rows, *record)
 
 
 @inlined
@@ -169,20 +122,20 @@ def project(model: Any, work: Any, state: Any, s: float, x: Any) -> None:
 @inlined
 def put_sides(state: Any, own: Any) -> None:
     """Set the sign of each guard to its sign at the start of the segment."""
-    put(state.sides, own.sides)
-    put(state.orders, own.orders)
-    put(state.floors, own.floors)
+    put(state.sides, own.search.sides)
+    put(state.orders, own.search.orders)
+    put(state.floors, own.search.floors)
 
 
 @inlined
 def begin_segment(start: Any, model: Any, call: Any, state: Any, work: Any, own: Any) -> bool:
     """Prepare the integration up to the next event from the states in ``work.y``; return False after a rejection."""
     tapes, inputs, k = model.tapes, model.inputs, start.mode_row
-    load_constants(inputs, tapes, k, state.p, own.V)
-    load_constants(inputs, tapes, k, state.p, own.W)
+    load_constants(inputs, tapes, k, state.p, own.search.V)
+    load_constants(inputs, tapes, k, state.p, own.search.W)
     first = tapes.active_start[k]
     for i in range(tapes.active_start[k + 1] - first):
-        own.guard_registers[i] = tapes.guards[k, tapes.active[first + i]]
+        own.search.guard_registers[i] = tapes.guards[k, tapes.active[first + i]]
     put_sides(state, own)
     put(state.x, work.y)
     for i in range(state.x.shape[0]):
@@ -213,7 +166,7 @@ def first_zero(start: Any, model: Any, own: Any, s: float, d: float) -> tuple[in
     count = tapes.active_start[k + 1] - tapes.active_start[k]
     outcome, g, at = first_guard(
         tapes, k, parts.rows[parts.start[k] : parts.start[k + 1]], model.inputs, own.codes,
-        own.guard_series.shape[1] - 1, own.control[RTOL], s, d, own.atol, own.guard_registers[:count], own,
+        own.search.guard_series.shape[1] - 1, own.control[RTOL], s, d, own.atol, own.polynomial, own.search,
     )  # fmt: skip
     number = -1
     for i in range(count):
@@ -228,7 +181,7 @@ def expand_at(model: Any, k: int, s: float, x: Any, own: Any) -> None:
 
     `guards_at_end` calls this kernel if there is no machine code.
     """
-    tapes, inputs, W, n = model.tapes, model.inputs, own.W, x.shape[0]
+    tapes, inputs, W, n = model.tapes, model.inputs, own.search.W, x.shape[0]
     rows = tapes.optimised[tapes.optimised_start[k] : tapes.optimised_start[k + 1]]
     if inputs.time[0] >= 0:
         W[inputs.time[0], 0], W[inputs.time[0], 1] = s, 1.0
@@ -240,7 +193,7 @@ def expand_at(model: Any, k: int, s: float, x: Any, own: Any) -> None:
             W[inputs.states[i], order + 1] = W[tapes.derivatives[k, i], order] / (order + 1)
     for j in range(tapes.active_start[k + 1] - tapes.active_start[k]):
         for order in range(TERMS):
-            own.guards[j, order] = W[own.guard_registers[j], order]
+            own.guards[j, order] = W[own.search.guard_registers[j], order]
 
 
 @inlined
@@ -248,7 +201,7 @@ def guards_at_end(start: Any, model: Any, own: Any, s: float, x: Any) -> None:
     """Write value, slope and half the second derivative of the active guards along the flow to ``own.guards``."""
     code = own.codes.ends[start.mode_row]
     if code != 0:
-        call_series(code, s, 0.0, x, own.guards, own.W, own.x)
+        call_series(code, s, 0.0, x, own.guards, own.search.W, own.x)
     else:
         expand_at(model, start.mode_row, s, x, own)
 
@@ -274,12 +227,26 @@ def end_segment(
 
     number: of the active guard that is zero there, -1 for none. ``own.guards`` belong to this end if there is one.
     """
+    hold_states(model, work, state, s)
+    return segment_end(start, model, call, state, work, own, s, length, number)
+
+
+@inlined
+def hold_states(model: Any, work: Any, state: Any, s: float) -> None:
+    """Compute the held states in ``work.y`` at the end of a segment from their constraints."""
+    if any_holding(model.automata, state.z):
+        call_function(called_by(work).project, s, work.y, state.p, state.z, work.x_after)
+        put(work.x_after, work.y)
+
+
+@inlined
+def segment_end(
+    start: Any, model: Any, call: Any, state: Any, work: Any, own: Any, s: float, length: float, number: int
+) -> SegmentEnd:
+    """Return the end of a segment as `end_segment` does; the held states are computed already."""
     k, y, taken, fired, slope, bend = start.mode_row, work.y, own.counts[TAKEN], -1, 0.0, 0.0
     if own.codes.ends[k] == 0:
         own.codes.lacked[k] += taken
-    if any_holding(model.automata, state.z):
-        call_function(called_by(work).project, s, y, state.p, state.z, work.x_after)
-        put(work.x_after, y)
     call_function(called_by(work).flow, s, y, state.p, state.z, work.slopes)
     error = 2.0 * 2.0**-52 * s
     if number >= 0:

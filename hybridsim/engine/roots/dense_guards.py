@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from hybridsim.engine.native.kernels import call_noinline, call_series, inlined, kernel
+from hybridsim.engine.native.struct_pack import packed
 from hybridsim.engine.record.hermite import fit_in_time
 from hybridsim.engine.roots.defect_check import keeps_up, sum_at
 from hybridsim.engine.roots.earliest_exit import earliest_exit, parts_for_exit
 from hybridsim.engine.roots.first_exit import FOUND, NEVER, OPEN
 from hybridsim.engine.series.bounded import UNIT
 from hybridsim.engine.series.interpreter import advance, reach, sum_sizes, tabulate
+from hybridsim.engine.system.system import System
 
 _SHORTER = 0.25
 _LONGER = 4.0
@@ -19,6 +23,51 @@ _ROUNDING = 16.0 * UNIT  # of a Bernstein coefficient, relative to the sum of th
 _SHORTEST = 2.0**-40  # of a step: shortest piece, on which a guard's series is useless
 # Largest number of subintervals of a step; they become very short near a point at which the guard is undefined.
 _MAX_SUBINTERVALS = 4096
+
+
+class GuardSearch(NamedTuple):
+    """The arrays of `first_guard`, for n states, G guards, R registers, and series up to `order`."""
+
+    V: np.ndarray  # (R, order + 1), series along the polynomial
+    W: np.ndarray  # (R, order + 1), values and series at points
+    states: np.ndarray
+    guard_series: np.ndarray
+    a: np.ndarray
+    b: np.ndarray
+    stack: np.ndarray
+    powers: np.ndarray
+    values: np.ndarray
+    sums: np.ndarray
+    totals: np.ndarray
+    floors: np.ndarray
+    ahead: np.ndarray
+    rates: np.ndarray
+    everyone: np.ndarray
+    guard_registers: np.ndarray  # (G,) registers of the active guards
+    sides: np.ndarray
+    orders: np.ndarray
+    bernstein: np.ndarray
+
+
+def guard_search(system: System, order: int) -> GuardSearch:
+    """Return new arrays of `first_guard` for series up to an order, packed."""
+    n, guards, columns, whole = system.n, system.guard_count, order + 1, np.int64
+    arrays: GuardSearch = packed(
+        GuardSearch(
+            **{name: np.zeros((system.registers.count, columns)) for name in ("V", "W")},
+            states=np.empty((n, columns)),
+            guard_series=np.empty((guards, columns)),
+            **{name: np.empty(columns) for name in ("a", "b")},
+            stack=np.empty((64, columns + 2)),
+            powers=np.empty(columns + 1),
+            **{name: np.empty(guards) for name in ("values", "sums", "totals", "floors")},
+            **{name: np.empty(n) for name in ("ahead", "rates")},
+            everyone=np.arange(guards, dtype=whole),
+            **{name: np.empty(guards, dtype=whole) for name in ("guard_registers", "sides", "orders")},
+            bernstein=np.zeros(0, dtype=whole),
+        )
+    )
+    return arrays
 
 
 @inlined
@@ -115,19 +164,18 @@ def stays_positive(left: Any, right: Any, order: int, floor: float, d: float, we
 
 
 @kernel
-def first_linear_guard(
-    tapes: Any, k: int, count: int, d: float, hermite: Any, scratch: Any
-) -> tuple[int, int, float]:
+def first_linear_guard(tapes: Any, k: int, d: float, hermite: Any, own: Any) -> tuple[int, int, float]:
     """Find the first guard that becomes negative, for guards that are linear in states and time.
 
-    scratch: the indices of the active guards, their Taylor coefficients at the ends of the step, `guards_left`
-    and `guards_right` (G, K), and their sides, orders and floors.
+    own: the Taylor coefficients of the active guards at the ends of the step, `guards_left` and `guards` (G, K), and
+    `search`, a `GuardSearch`.
     """
-    left, right, numbers = scratch.guards_left, scratch.guards_right, scratch.numbers
+    left, right, scratch = own.guards_left, own.guards, own.search
     sides, orders, floors = scratch.sides, scratch.orders, scratch.floors
+    first, count = tapes.active_start[k], tapes.active_start[k + 1] - tapes.active_start[k]
     is_positive = True
     for i in range(count):
-        g = numbers[i]
+        g = tapes.active[first + i]
         is_positive = (
             is_positive
             and sides[g] > 0
@@ -135,9 +183,9 @@ def first_linear_guard(
         )
     outcome, g, at = NEVER, -1, d
     if not is_positive:
-        polynomials, guard_registers, V = scratch.polynomials, scratch.guard_registers, scratch.V
+        polynomials, guard_registers, V = own.polynomials, scratch.guard_registers, scratch.V
         left, right = left[:count], right[:count]
-        if not fit_in_time(left, right, d, hermite.shift, hermite.inverse, scratch.lack, polynomials[:count]):
+        if not fit_in_time(left, right, d, hermite.shift, hermite.inverse, own.lack, polynomials[:count]):
             return OPEN, -1, 0.0
         degree = polynomials.shape[1] - 1
         for i in range(count):
@@ -150,17 +198,9 @@ def first_linear_guard(
         for i in range(count):
             scratch.totals[i] = sum_sizes(V, guard_registers[i], degree + 2, scratch.powers)
         outcome, g, at = earliest_exit(
-            tapes,
-            k,
-            degree + 2,
-            d,
-            V,
-            guard_registers,
-            scratch.powers,
-            scratch.totals,
-            parts_for_exit(scratch),
+            tapes, k, degree + 2, d, V, guard_registers, scratch.powers, scratch.totals, parts_for_exit(scratch),
             scratch.bernstein,
-        )
+        )  # fmt: skip
     if outcome == NEVER:
         begin_positive(sides, orders, floors)
     return outcome, g, at
@@ -191,32 +231,28 @@ def first_guard(
     s: float,
     d: float,
     atol: Any,
-    guard_registers: Any,
+    polynomial: Any,
     scratch: Any,
 ) -> tuple[int, int, float]:
     """Find the guard that becomes negative first in a step; return FOUND, NEVER or OPEN with the time.
 
-    The time counts from s. rows: tape rows that the guards need; codes: `EndsCodes`. scratch: `polynomial` (n,
-    m), the states in powers of the time from s; V and W with the constants of the tape in their registers;
-    sides, orders and floors of the guards just after s, as in `earliest_exit`, which are updated. The series
+    The time counts from s. rows: tape rows that the guards need; codes: `EndsCodes`. polynomial (n, m): the
+    states in powers of the time from s. scratch: `GuardSearch`; V and W with the constants of the tape in their
+    registers; sides, orders and floors of the guards just after s, as in `earliest_exit`, which are updated. The series
     of a guard is used as long as its last terms stay below rtol of its largest one and it agrees with the
     guard at its end. There the next piece begins.
     """
     along, values_code = codes.along[k], codes.values[k]
-    x, U, values, y, rates = (
-        scratch.states,
-        scratch.guard_series,
-        scratch.values,
-        scratch.ahead,
-        scratch.rates,
-    )
-    everyone = scratch.everyone[: guard_registers.shape[0]]
+    x, U, values = scratch.states, scratch.guard_series, scratch.values
+    y, rates = scratch.ahead, scratch.rates
+    count = tapes.active_start[k + 1] - tapes.active_start[k]
+    guard_registers, everyone = scratch.guard_registers[:count], scratch.everyone[:count]
     none = everyone[:0]
     q = 0.0
     for _ in range(_MAX_SUBINTERVALS):
         if not q < d:
             return NEVER, -1, d
-        shifted(scratch.polynomial, q, x)
+        shifted(polynomial, q, x)
         series_along(along, rows, inputs, s + q, x, guard_registers, scratch.V, scratch.W, U)
         left = d - q
         longest = min(left, likely_reach(U, everyone, order, rtol))
@@ -226,17 +262,8 @@ def first_guard(
         if not w > _SHORTEST * d:
             return OPEN, -1, q
         outcome, g, at = earliest_exit(
-            tapes,
-            k,
-            order,
-            w,
-            U,
-            everyone,
-            scratch.powers,
-            scratch.totals,
-            parts_for_exit(scratch),
-            scratch.bernstein,
-        )
+            tapes, k, order, w, U, everyone, scratch.powers, scratch.totals, parts_for_exit(scratch), scratch.bernstein
+        )  # fmt: skip
         if outcome == OPEN:
             return OPEN, g, q + at
         while True:

@@ -13,9 +13,10 @@ from hybridsim.engine.events.compiled.known_time import ORIGIN_AT, PHASES_AT, SI
 from hybridsim.engine.events.compiled.scratch import work_space
 from hybridsim.engine.events.state import HybridState
 from hybridsim.engine.linear.tables import no_tables
-from hybridsim.engine.native.struct_pack import packed
+from hybridsim.engine.native.struct_pack import packed, replaced
 from hybridsim.engine.record.blocks import SegmentBlock
 from hybridsim.engine.record.counters import Counters
+from hybridsim.engine.record.series_block import SeriesBlock
 from hybridsim.engine.run.event_loop import LoopCall, LoopModel
 from hybridsim.engine.system.instant import Instant
 from hybridsim.engine.system.known_times import KnownTimes
@@ -147,6 +148,37 @@ class MethodKernels(ABC):
     def place(self, place: np.ndarray) -> None:
         """Restore the method's state between calls from a checkpoint."""
         return
+
+
+class StepKernels(MethodKernels):
+    """The kernels of a method that records `terms` coefficients of each state for each step.
+
+    adapted: names of attributes that provide arrays for the instruction tapes of the run, by their method `of`.
+    """
+
+    rows = StepRows
+    blocks: ClassVar[type[SeriesBlock]] = SeriesBlock
+    adapted: ClassVar[tuple[str, ...]] = ("parts", "codes")
+
+    def __init__(self, system: System, longest: float, terms: int) -> None:
+        super().__init__(system, longest)
+        self.terms, self.columns = terms, system.n * terms + 2
+
+    def fields(self) -> Sequence[tuple[Any, tuple[int, ...]]]:
+        """Return the dtype and the row shape of each array in `rows`."""
+        return (float, (2,)), (float, (self.system.n, self.terms))
+
+    def of_tapes(self, tapes: Tapes) -> dict[str, Any]:
+        """Return by name the arrays that belong to the given instruction tapes."""
+        return {name: getattr(self, name).of(tapes) for name in self.adapted}
+
+    def with_tapes(self, own: Any, tapes: Tapes) -> Any:
+        """Return the arrays of a call, adapted to the given instruction tapes."""
+        return replaced(own, **self.of_tapes(tapes))
+
+    def block(self, result: Any, rows: Any, last_steps: np.ndarray, *record: np.ndarray) -> SeriesBlock:
+        """Return the segments that one call of the compiled loop has stored."""
+        return self.blocks(self.recorded, last_steps, *rows, *record)
 
 
 class CallArrays:

@@ -41,22 +41,26 @@ def series_order(rtol: float, linear: bool = False) -> int:
     return max(_SMALLEST_ORDER, math.ceil((_LINEAR if linear else _SMOOTH) * order))
 
 
+def registers_at(system: System, p: np.ndarray, z: np.ndarray, terms: int) -> np.ndarray:
+    """Return registers (R, terms) of Taylor coefficients that hold the constants of a combination of modes."""
+    inputs, V = system.registers.inputs, np.zeros((system.registers.count, terms))
+    V[inputs.constants, 0] = inputs.values[:, 0]
+    V[inputs.parameters, 0] = p[inputs.sources]
+    advance(system.optimised_tape(z).constant_rows, V, 0)
+    return V
+
+
 class SeriesRun:
     """Expands the flow with fixed modes and inputs in Taylor series at successive points."""
 
     def __init__(self, system: System, p: np.ndarray, z: np.ndarray, tolerances: Tolerances) -> None:
-        tape, self.optimised = system.code.data["tape"], system.optimised_tape(z)
+        inputs, self.optimised = system.registers.inputs, system.optimised_tape(z)
         self.rtol, self.atol = max(tolerances.rtol, TIGHTEST), tolerances.atol
         self.high = np.array(system.high_rows(z), dtype=np.int64).reshape(-1, 5)
         self.order = series_order(self.rtol, system.is_linear)
-        self.V = np.zeros((system.registers.count, self.order + 1))
-        for register, value, _ in tape["constants"]:
-            self.V[register, 0] = value
-        for register, source in tape["parameters"]:
-            self.V[register, 0] = p[source]
-        advance(self.optimised.constant_rows, self.V, 0)
-        self.states = np.array(tape["states"], dtype=np.int64)
-        self.flow_registers = (tape["time"], self.states, self.optimised.derivatives)
+        self.V = registers_at(system, p, z, self.order + 1)
+        self.states = inputs.states
+        self.flow_registers = (int(inputs.time[0]), self.states, self.optimised.derivatives)
         self.guards = self.optimised.guards[np.flatnonzero(system.active(z))]
         self.monitored_registers = np.concatenate([self.guards, self.optimised.monitors])
 

@@ -9,10 +9,9 @@ from functools import cached_property
 import numpy as np
 
 from hybridsim.engine.run.stepping import Flow
-from hybridsim.engine.series.interpreter import advance
 from hybridsim.engine.system.tolerances import Tolerances
 from hybridsim.integrators.one_step import OneStepStepper, Point, Trial
-from hybridsim.integrators.rosenbrock.step import RosenbrockTableau, linearise, rosenbrock_attempt, solve
+from hybridsim.integrators.rosenbrock.step import Linearisation, RosenbrockTableau, rosenbrock_attempt, solve
 
 _DEFECT = 100.0  # largest defect in the middle of a step, in tolerances, as for Runge-Kutta methods
 
@@ -68,15 +67,8 @@ class RosenbrockStepper(OneStepStepper):
         tolerances: Tolerances,
         first_step: float | None,
     ) -> None:
-        self.tableau, system, n = tableau, flow.system, flow.n
-        self._address = system.address("flow")
-        tape = system.optimised_tape(flow.z)
-        inputs = system.registers.inputs
-        self._rows, self._flow_registers = tape.rows, (int(inputs.time[0]), inputs.states, tape.derivatives)
-        self._V = np.zeros((system.registers.count, 2))
-        self._V[inputs.constants, 0] = inputs.values[:, 0]
-        self._V[inputs.parameters, 0] = flow.p[inputs.sources]
-        advance(tape.constant_rows, self._V, 0)
+        self.tableau, n, self._address = tableau, flow.n, flow.system.address("flow")
+        self._linearisation = Linearisation(flow.system, flow.p, flow.z)
         self._scratch = (np.empty((n, n)), np.empty(n, dtype=np.int64), np.empty(n))
         super().__init__(flow, x0, bound, tolerances, first_step, tableau.order, tableau.error_order)
 
@@ -84,11 +76,8 @@ class RosenbrockStepper(OneStepStepper):
         return RosenbrockPoint(self.flow, s, x, self._linearised)
 
     def _linearised(self, s: float, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        n = self.flow.n
-        jacobian, rate = np.empty((n, n)), np.empty(n)
-        self.flow.counters.rhs_evaluations += n + 1
-        linearise(self._rows, self._flow_registers, s, x, self._V, jacobian, rate)
-        return jacobian, rate
+        self.flow.counters.rhs_evaluations += self.flow.n + 1
+        return self._linearisation.at(s, x)
 
     def attempt(self, start: Point, h: float) -> Trial:
         assert isinstance(start, RosenbrockPoint)

@@ -10,6 +10,8 @@ import numpy as np
 
 from hybridsim.engine.native.kernels import call, kernel
 from hybridsim.engine.series.interpreter import advance
+from hybridsim.engine.system.series_at import registers_at
+from hybridsim.engine.system.system import System
 
 _SMALLEST_NORMAL = 2.0**-1022  # of doubles; the reciprocals of smaller numbers may overflow
 
@@ -67,6 +69,21 @@ def linearise(rows: Any, flow_registers: Any, s: float, x: Any, V: Any, jacobian
         for i in range(n):
             jacobian[i, j] = V[derivatives[i], 1]
         V[states[j], 1] = 0.0
+
+
+class Linearisation:
+    """Computes Jacobians (n, n) and time derivatives (n,) of the flow in one combination of modes."""
+
+    def __init__(self, system: System, p: np.ndarray, z: np.ndarray) -> None:
+        inputs, tape = system.registers.inputs, system.optimised_tape(z)
+        self._rows, self._flow_registers = tape.rows, (int(inputs.time[0]), inputs.states, tape.derivatives)
+        self._V = registers_at(system, p, z, 2)
+
+    def at(self, s: float, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the Jacobian and the time derivative at (s, x)."""
+        jacobian, rate = np.empty((len(x), len(x))), np.empty(len(x))
+        linearise(self._rows, self._flow_registers, s, x, self._V, jacobian, rate)
+        return jacobian, rate
 
 
 @kernel

@@ -13,7 +13,7 @@ from hybridsim.engine.run.compiled_loop import CompiledLoop, compile_loops
 from hybridsim.engine.run.stepping import Flow, Stepper, Watch
 from hybridsim.engine.system.system import System
 from hybridsim.engine.system.tolerances import Tolerances
-from hybridsim.integrators.contract import Integrator
+from hybridsim.integrators.contract import EXPLICIT, Integrator
 from hybridsim.integrators.one_step import OneStepStepper, Point, Trial
 from hybridsim.integrators.runge_kutta.compiled_loop import RungeKuttaKernels
 from hybridsim.integrators.runge_kutta.step import Tableau, attempt
@@ -83,7 +83,7 @@ class RungeKuttaIntegrator(Integrator):
     """
 
     tableau: ClassVar[Tableau]
-    lacks: ClassVar[dict[str, str]] = {"stiff": "it is explicit: the fastest rate limits its step"}
+    lacks: ClassVar[dict[str, str]] = EXPLICIT
     has_compiled_loop: ClassVar[bool] = True
 
     @property

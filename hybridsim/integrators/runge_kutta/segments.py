@@ -10,34 +10,37 @@ import math
 from typing import Any
 
 from hybridsim.engine.events.compiled.after_segment import fill_guard_series, state_errors
-from hybridsim.engine.events.compiled.at_end import may_vanish
 from hybridsim.engine.events.compiled.known_time import SEGMENTS, STEPS
 from hybridsim.engine.events.compiled.scratch import called_by, note_or_restore
 from hybridsim.engine.native.kernels import call, call_noinline, call_series, inlined, kernel
-from hybridsim.engine.native.loop_hints import put
 from hybridsim.engine.native.time_grid import on_the_grid
 from hybridsim.engine.record.hermite import fit_in_time, holds_between
 from hybridsim.engine.roots.dense_guards import first_guard, first_linear_guard
 from hybridsim.engine.roots.first_exit import FOUND, OPEN
 from hybridsim.engine.run.event_loop import (
-    FOLLOWED,
     FULL,
     MIN_STEPS_IN_PART,
     STOPPED,
     SegmentEnd,
-    any_holding,
-    any_projecting,
     event_loop,
-    load_constants,
     not_followed,
 )
 from hybridsim.engine.series.bounded import UNIT
 from hybridsim.engine.series.interpreter import advance, expand
-from hybridsim.integrators.polynomial_steps import put_sides
+from hybridsim.integrators.polynomial_steps import (
+    REJECTED,
+    TAKEN,
+    TRIED,
+    begin_segment,
+    hold_states,
+    project,
+    put_sides,
+    segment_end,
+)
 from hybridsim.integrators.runge_kutta.step import attempt
 from hybridsim.integrators.step_control import LAST_STEP_FACTOR, SAFETY, SMALLEST, forget, next_length
 
-LANDED, UNSURE, REJECTED, LOST = 0, 1, 2, 3
+LANDED, UNSURE, INACCURATE, LOST = range(4)  # results of `land`
 _NEIGHBOURHOOD = 0.125  # share of a step within which an event time is corrected
 _CORRECTIONS = 5  # most corrections of an event time; they converge quadratically
 _HALF = 0.5
@@ -154,54 +157,39 @@ def is_still(stages: Any) -> bool:
 
 @kernel
 def land(
-    functions: Any,
-    tableau: Any,
-    tolerances: Any,
-    tapes: Any,
-    k: int,
-    guard_rows: Any,
-    inputs: Any,
-    code: int,
-    guard_registers: Any,
-    place: int,
-    s: float,
-    d: float,
-    h: float,
-    state: Any,
-    is_projected: bool,
-    scale: Any,
-    scratch: Any,
-    work: Any,
+    model: Any, k: int, place: int, s: float, d: float, h: float, scale: Any, state: Any, own: Any, work: Any
 ) -> tuple[int, float]:
     """Repeat a step up to the zero of a guard that was located on the dense output.
 
-    place: index of the function. The step starts from work.y; its end is in work.x_after, the series there in
-    scratch.right and scratch.guards_right. code: see `series_of`. Newton's method corrects the time to the accuracy of
-    rounding; it repeats the step only beyond the range of the series. is_projected: whether to project the end.
+    place: index of the guard. The step starts from work.y; its end is in work.x_after, the series there in own.right
+    and own.guards. Newton's method corrects the time to the accuracy of rounding; it repeats the step only beyond the
+    range of the series.
     """
-    W, right, y, y1, last = scratch.W, scratch.right, work.y, work.x_after, scratch.right.shape[1] - 1
-    p, z = state.p, state.z
+    settings, parts, tapes, inputs = own.settings, own.parts, model.tapes, model.inputs
+    flow, tableau, tolerances = called_by(work).flow, settings.tableau, (settings.control[0], settings.atol)
+    right, y, y1, last, p, z = own.right, work.y, work.x_after, own.right.shape[1] - 1, state.p, state.z
+    guard_rows = parts.rows[parts.start[k] : parts.start[k + 1]]
+    guard_registers = own.search.guard_registers[: tapes.active_start[k + 1] - tapes.active_start[k]]
     rows = tapes.optimised[tapes.optimised_start[k] : tapes.optimised_start[k + 1]]
     flow_registers = (inputs.time[0], inputs.states, tapes.derivatives[k])
+    code, W = own.codes.ends[k], own.search.W
     low, high = max(0.0, d - _NEIGHBOURHOOD * h), min(h, d + _NEIGHBOURHOOD * h)
     d = (s + d) - s
     if not d > 0.0:
         return LOST, d
     error = 0.0
-    if not is_still(scratch.stages):
-        error = attempt(functions.flow, tableau, s, d, y, scratch.dx, p, z, tolerances, scratch.stages, y1)
-        scratch.counts[0] += 1
+    if not is_still(own.stages):
+        error = attempt(flow, tableau, s, d, y, own.dx, p, z, tolerances, own.stages, y1)
+        own.counts[TRIED] += 1
     for _ in range(_CORRECTIONS):
         if not error <= 1.0:
-            return REJECTED, d
-        if is_projected:
-            call(functions.project, s + d, y1, p, z, work.slopes)
-            put(work.slopes, y1)
+            return INACCURATE, d
+        project(model, work, state, s + d, y1)
         if not series_of(
-            code, rows, guard_rows, flow_registers, s + d, y1, guard_registers, W, right, scratch.guards_right
+            code, rows, guard_rows, flow_registers, s + d, y1, guard_registers, W, right, own.guards
         ):
             return LOST, d
-        value, slope = scratch.guards_right[place, 0], scratch.guards_right[place, 1]
+        value, slope = own.guards[place, 0], own.guards[place, 1]
         move = -value / slope if slope != 0.0 else math.nan
         if not abs(move) < math.inf:
             return LOST, d
@@ -218,13 +206,11 @@ def land(
         if is_near:
             for i in range(y.shape[0]):
                 y1[i] = right[i, last]
-                for k in range(last - 1, -1, -1):
-                    y1[i] = y1[i] * move + right[i, k]
+                for j in range(last - 1, -1, -1):
+                    y1[i] = y1[i] * move + right[i, j]
         else:
-            error = attempt(
-                functions.flow, tableau, s, d, y, scratch.dx, p, z, tolerances, scratch.stages, y1
-            )
-            scratch.counts[0] += 1
+            error = attempt(flow, tableau, s, d, y, own.dx, p, z, tolerances, own.stages, y1)
+            own.counts[TRIED] += 1
     return UNSURE, d
 
 
@@ -250,40 +236,30 @@ def runge_kutta_segment(
     """
     k, bound, _, is_rejected = start
     n_steps = first_step = loop.int_slots[STEPS]
-    note_or_restore(own.counts, is_rejected, work)
     note_or_restore(own.first_step, is_rejected, work)
-    if is_rejected:
+    if not begin_segment(start, model, loop, state, work, own):
         return not_followed(STOPPED)
-    automata, tapes, inputs, functions = model.automata, model.tapes, model.inputs, called_by(work)
+    tapes, inputs, flow = model.tapes, model.inputs, called_by(work).flow
     settings, parts, codes, first = own.settings, own.parts, own.codes, own.first_step
     tableau, hermite, atol = settings.tableau, settings.hermite, settings.atol
     orders, sizes = settings.leading_orders, settings.leading
     leading = (orders[0], sizes[0], sizes[1], orders[1], sizes[2])
     error_order, order = settings.orders[0], settings.orders[1]
     rtol, max_step = settings.control[0], settings.control[1]
-    x, z, p, longest = state.x, state.z, state.p, loop.longest[0]
-    W, left, right = own.W, own.left, own.right
+    z, p, longest = state.z, state.p, loop.longest[0]
+    W, left, right, ahead = own.search.W, own.left, own.right, own.search.ahead
     scale, slopes, y, y1 = loop.scale, work.slopes, work.y, work.x_after
-    steps, series, n, terms, tolerances = rows.steps, rows.series, x.shape[0], left.shape[1], (rtol, atol)
+    steps, series, n, terms, tolerances = rows.steps, rows.series, y.shape[0], left.shape[1], (rtol, atol)
     guard_rows = parts.rows[parts.start[k] : parts.start[k + 1]]
     step_rows = parts.step_rows[parts.step_start[k] : parts.step_start[k + 1]]
     is_linear = parts.is_linear[k]
     step_guards = guard_rows if is_linear else guard_rows[:0]
     flow_registers = (inputs.time[0], inputs.states, tapes.derivatives[k])
     ends_code, first_code = codes.ends[k], codes.first[k]
-    load_constants(inputs, tapes, k, p, own.V)
-    load_constants(inputs, tapes, k, p, W)
-    guard_registers = own.guard_registers[: tapes.active_start[k + 1] - tapes.active_start[k]]
-    for i in range(guard_registers.shape[0]):
-        own.numbers[i] = tapes.active[tapes.active_start[k] + i]
-        guard_registers[i] = tapes.guards[k, own.numbers[i]]
-    put_sides(state, own)
-    s, fired, is_sure, value, slope, bend, d = 0.0, -1, True, 0.0, 0.0, 0.0, 0.0
-    is_holding, is_projected = any_holding(automata, z), any_projecting(automata, z)
+    first_active = tapes.active_start[k]
+    guard_registers = own.search.guard_registers[: tapes.active_start[k + 1] - first_active]
+    s, fired, place, is_sure, d = 0.0, -1, -1, True, 0.0
     forget(own.memory)
-    put(x, y)
-    for i in range(n):
-        scale[i] = abs(x[i])
     if first_code != 0:
         call_series(first_code, 0.0, 0.0, y, own.guards_left, W, own.first)
     else:
@@ -313,33 +289,29 @@ def runge_kutta_segment(
         tried = d
         for i in range(n):
             own.dx[i] = left[i, 1]
-        error = attempt(functions.flow, tableau, s, d, y, own.dx, p, z, tolerances, own.stages, y1)
-        own.counts[0] += 1
+        error = attempt(flow, tableau, s, d, y, own.dx, p, z, tolerances, own.stages, y1)
+        own.counts[TRIED] += 1
         h = min(next_length(d, error, error_order, own.memory), max_step)
-        if is_projected:
-            call(functions.project, s + d, y1, p, z, slopes)
-            put(slopes, y1)
+        project(model, work, state, s + d, y1)
         if not (
             error <= 1.0
             and series_of(
                 ends_code, step_rows, step_guards, flow_registers, s + d, y1, guard_registers, W, right,
-                own.guards_right,
+                own.guards,
             )
         ):  # fmt: skip
-            own.counts[1] += 1
+            own.counts[REJECTED] += 1
             h = min(h, _HALF * d) if error <= 1.0 else h
             continue
-        if not holds_between(
-            functions.flow, hermite.middle, s, d, left, right, p, z, tolerances, own.ahead, slopes
-        ):
-            own.counts[1] += 1
+        if not holds_between(flow, hermite.middle, s, d, left, right, p, z, tolerances, ahead, slopes):
+            own.counts[REJECTED] += 1
             h = _HALF * d
             continue
         if is_linear:
-            outcome, g, at = first_linear_guard(tapes, k, guard_registers.shape[0], d, hermite, own)
+            outcome, g, at = first_linear_guard(tapes, k, d, hermite, own)
         elif fit_in_time(left, right, d, hermite.shift, hermite.inverse, own.lack, own.polynomial):
             outcome, g, at = first_guard(
-                tapes, k, guard_rows, inputs, codes, order, rtol, s, d, atol, guard_registers, own
+                tapes, k, guard_rows, inputs, codes, order, rtol, s, d, atol, own.polynomial, own.search
             )
         else:
             outcome, g, at = OPEN, -1, 0.0
@@ -347,26 +319,21 @@ def runge_kutta_segment(
             return not_followed(STOPPED)
         if outcome == FOUND:
             place = 0
-            while own.numbers[place] != g:
+            while tapes.active[first_active + place] != g:
                 place += 1
-            code, at = land(
-                functions, tableau, tolerances, tapes, k, guard_rows, inputs, ends_code, guard_registers, place,
-                s, at, d, state, is_projected, scale, own, work,
-            )  # fmt: skip
+            code, at = land(model, k, place, s, at, d, scale, state, own, work)
             if code == LOST:
                 return not_followed(STOPPED)
-            if code != REJECTED and not holds_between(
-                functions.flow, hermite.middle, s, at, left, right, p, z, tolerances, own.ahead, slopes
+            if code != INACCURATE and not holds_between(
+                flow, hermite.middle, s, at, left, right, p, z, tolerances, ahead, slopes
             ):
-                code = REJECTED
-            if code == REJECTED:
-                own.counts[1] += 1
+                code = INACCURATE
+            if code == INACCURATE:
+                own.counts[REJECTED] += 1
                 h = _HALF * at
                 if s == 0.0:
                     put_sides(state, own)
                 continue
-            ahead = own.guards_right[place]
-            value, slope, bend = ahead[0], ahead[1], ahead[2]
             d, is_last, fired, is_sure = at, False, g, code == LANDED
         steps[n_steps, 0], steps[n_steps, 1] = s, d
         for i in range(n):
@@ -377,28 +344,17 @@ def runge_kutta_segment(
             scale[i] = max(scale[i], abs(y1[i]))
         for i in range(guard_registers.shape[0]):
             for j in range(terms):
-                own.guards_left[i, j] = own.guards_right[i, j]
+                own.guards_left[i, j] = own.guards[i, j]
         n_steps += 1
         tried = math.inf
         s = bound if is_last else s + d
+    own.counts[TAKEN] = n_steps - first_step
     if ends_code == 0:
-        codes.lacked[k] += n_steps - first_step + 1
-    if is_holding:
-        call(functions.project, s, y, p, z, y1)
-        put(y1, y)
+        codes.lacked[k] += 1  # the first point
+    hold_states(model, work, state, s)
     if fired >= 0 and not is_sure and not is_zero(model, fired, s, scale, state, work):
         return not_followed(STOPPED)
-    if fired >= 0 or s >= bound:
-        call(functions.flow, s, y, p, z, slopes)
-    s_error = 2.0 * 2.0**-52 * s
-    if fired >= 0:
-        if slope != 0.0 and abs(value / slope) < math.inf:
-            s_error = max(s_error, abs(value / slope))
-    elif s >= bound:
-        latest = max(abs(loop.times[0]), abs(loop.times[2]))
-        if may_vanish(model, k, s, latest, n_steps - first_step, scale, slopes, state, work):
-            return not_followed(STOPPED)
-    return SegmentEnd(FOLLOWED, s, fired, n_steps - first_step, s, s_error, slope, bend, d, False)
+    return segment_end(start, model, loop, state, work, own, s, d, place if fired >= 0 else -1)
 
 
 def runge_kutta_loop(model: Any, call: Any, state: Any, work: Any, record: Any, own: Any, rows: Any) -> int:

@@ -9,21 +9,13 @@ import numpy as np
 
 from hybridsim.engine.run.stepping import Flow, Stepper, Watch
 from hybridsim.engine.system.tolerances import Tolerances
-from hybridsim.integrators.contract import Integrator
+from hybridsim.integrators.contract import EXPLICIT, RESTARTED, Integrator
 from hybridsim.integrators.first_steps import with_first_steps
 from hybridsim.integrators.scipy.native import NativeStepper
 from hybridsim.integrators.scipy.stepper import SolverStepper, series_step
 
-_NOISE = {
-    "accumulation": "it does not resolve events closer than its tolerances, since each restart is at order one"
-}
-_EXPLICIT = {"stiff": "it is explicit: the fastest rate limits its step"}
 # roots of |R(-z)| = 1 for their stability polynomials
-_STABLE = {
-    "RK23": 2.513,
-    "RK45": 3.307,
-    "DOP853": 6.394,
-}
+_STABLE = {"RK23": 2.513, "RK45": 3.307, "DOP853": 6.394}
 
 
 @dataclass(frozen=True)
@@ -106,7 +98,7 @@ class ScipyRK23(ScipyIntegrator):
     order: ClassVar[str] = "3(2)"
     reference: ClassVar[str] = "Bogacki and Shampine 1989, doi:10.1016/0893-9659(89)90079-7"
     when: ClassVar[str] = "very loose tolerances, 1e-3 and above"
-    lacks: ClassVar[dict[str, str]] = _EXPLICIT
+    lacks: ClassVar[dict[str, str]] = EXPLICIT
     solver: ClassVar[str] = "RK23"
 
 
@@ -122,7 +114,7 @@ class ScipyRK45(ScipyIntegrator):
     order: ClassVar[str] = "5(4)"
     reference: ClassVar[str] = "Dormand and Prince 1980, doi:10.1016/0771-050X(80)90013-3"
     when: ClassVar[str] = "loose tolerances, smooth non-stiff modes"
-    lacks: ClassVar[dict[str, str]] = _EXPLICIT
+    lacks: ClassVar[dict[str, str]] = EXPLICIT
     solver: ClassVar[str] = "RK45"
 
 
@@ -138,7 +130,7 @@ class ScipyDOP853(ScipyIntegrator):
     order: ClassVar[str] = "8(5,3)"
     reference: ClassVar[str] = "Hairer, Norsett and Wanner 1993, doi:10.1007/978-3-540-78862-1, section II.10"
     when: ClassVar[str] = "tight tolerances, smooth non-stiff modes"
-    lacks: ClassVar[dict[str, str]] = _EXPLICIT
+    lacks: ClassVar[dict[str, str]] = EXPLICIT
     solver: ClassVar[str] = "DOP853"
 
 
@@ -172,7 +164,7 @@ class ScipyBDF(ScipyIntegrator):
     reference: ClassVar[str] = "Shampine and Reichelt 1997, doi:10.1137/S1064827594276424"
     when: ClassVar[str] = "stiff modes, few events, loose tolerances"
     lacks: ClassVar[dict[str, str]] = {
-        **_NOISE,
+        **RESTARTED,
         "poles": "after a trial step beyond a pole it restarts at order one, with steps too short to change the time",
     }
     dense_is_accurate: ClassVar[bool] = True
@@ -194,7 +186,7 @@ class ScipyLSODA(ScipyIntegrator):
     order: ClassVar[str] = "1 to 12"
     reference: ClassVar[str] = "Petzold 1983, doi:10.1137/0904010"
     when: ClassVar[str] = "modes that may or may not be stiff"
-    lacks: ClassVar[dict[str, str]] = _NOISE
+    lacks: ClassVar[dict[str, str]] = RESTARTED
     dense_is_accurate: ClassVar[bool] = True
     solver: ClassVar[str] = "LSODA"
     is_multistep: ClassVar[bool] = True

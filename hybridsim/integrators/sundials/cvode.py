@@ -16,13 +16,10 @@ from hybridsim.engine.record.segments import Dense
 from hybridsim.engine.run.stepping import Flow, Step, Stepper, Watch
 from hybridsim.engine.system.failures import StepFailure
 from hybridsim.engine.system.tolerances import Tolerances
-from hybridsim.integrators.contract import Integrator
+from hybridsim.integrators.contract import RESTARTED, Integrator
 from hybridsim.integrators.first_steps import with_first_steps
 from hybridsim.integrators.past_steps import MAX_PAST_POINTS, converges, through
 
-_NOISE = {
-    "accumulation": "it does not resolve events closer than its tolerances, since each restart is at order one"
-}
 # More steps than one output should need; CVODE's default of 500 would end long smooth segments.
 _MAX_STEPS = 10_000_000
 _SMALLEST = 2e-14  # smallest rtol that CVODE accepts
@@ -188,7 +185,7 @@ class CvodeBDF(_Cvode):
     order: ClassVar[str] = "1 to 5"
     reference: ClassVar[str] = "Hindmarsh et al. 2005, doi:10.1145/1089014.1089020"
     when: ClassVar[str] = "stiff modes"
-    lacks: ClassVar[dict[str, str]] = _NOISE
+    lacks: ClassVar[dict[str, str]] = RESTARTED
     formulas: ClassVar[str] = "BDF"
 
 
@@ -206,7 +203,7 @@ class CvodeAdams(_Cvode):
     reference: ClassVar[str] = "Hindmarsh et al. 2005, doi:10.1145/1089014.1089020"
     when: ClassVar[str] = "long smooth motions, not stiff"
     lacks: ClassVar[dict[str, str]] = {
-        **_NOISE,
+        **RESTARTED,
         "stiff": "with stiff rates its iteration converges only with very short steps: use cvode-bdf",
     }
     formulas: ClassVar[str] = "Adams"

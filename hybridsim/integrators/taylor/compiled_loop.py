@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from hybridsim.engine.native.constants import TIGHTEST
-from hybridsim.engine.native.struct_pack import packed, replaced
+from hybridsim.engine.native.struct_pack import packed
 from hybridsim.engine.record.counters import Counters
-from hybridsim.engine.record.series_block import SeriesBlock
 from hybridsim.engine.roots.defect_check import ahead_size
-from hybridsim.engine.run.method_kernels import MethodKernels, StepRows
+from hybridsim.engine.run.method_kernels import StepKernels
 from hybridsim.engine.system.programs.code_cache import series_codes
 from hybridsim.engine.system.programs.high_parts import high_parts_of
 from hybridsim.engine.system.programs.mode_code import most_fading
@@ -53,31 +51,29 @@ class TaylorArrays(NamedTuple):
     largest: np.ndarray  # largest values (G,) of the guards on the segment
 
 
-class TaylorKernels(MethodKernels):
+class TaylorKernels(StepKernels):
     """Connects Taylor's method to the compiled loop of a run."""
 
     loop = staticmethod(taylor_loop)
-    rows = StepRows
+    adapted = ("high", "codes")
 
     def __init__(self, system: System, tolerances: Tolerances, longest: float) -> None:
-        super().__init__(system, longest)
         rtol = max(tolerances.rtol, TIGHTEST)
         self.order = series_order(rtol, system.is_linear)
+        super().__init__(system, longest, self.order + 1)
         self.settings = TaylorSettings(
             np.array([rtol, tolerances.max_step]), np.array(tolerances.atol, dtype=float)
         )
-        self.kind, self.columns = f"order {self.order}", system.n * (self.order + 1) + 2
+        self.kind = f"order {self.order}"
         self.codes, self.high = series_codes(system, self.order), high_parts_of(system)
 
     def arrays(self) -> Any:
         """Return new arrays for one call of the compiled Taylor loop."""
         system, order, n = self.system, self.order, self.system.n
-        tapes = tape_cache_of(system).tapes
         registers, guards, fading = system.registers.count, system.guard_count, most_fading(system)
         return packed(
             TaylorArrays(
-                high=self.high.of(tapes),
-                codes=self.codes.of(tapes),
+                **self.of_tapes(tape_cache_of(system).tapes),
                 settings=packed(TaylorSettings(np.empty(2), np.empty(n))),
                 V=np.zeros((registers, order + 1)),
                 W=np.zeros((registers, order + 1)),
@@ -94,18 +90,10 @@ class TaylorKernels(MethodKernels):
             )
         )
 
-    def fields(self) -> Sequence[tuple[Any, tuple[int, ...]]]:
-        """Return the dtype and the row shape of each array in `rows`."""
-        return (float, (2,)), (float, (self.system.n, self.order + 1))
-
     def begin(self, own: Any, tapes: Tapes) -> Any:
         """Write the settings and the compiled operations of the run to the arrays."""
         own.settings.control[:], own.settings.atol[:] = self.settings
         return self.with_tapes(own, tapes)
-
-    def with_tapes(self, own: Any, tapes: Tapes) -> Any:
-        """Return the arrays, with the instructions for high orders and the machine code of the instruction tapes."""
-        return replaced(own, high=self.high.of(tapes), codes=self.codes.of(tapes))
 
     def end(self, own: Any, tapes: Tapes, lin: Any) -> None:
         """Compile machine code for modes in which many steps were taken."""
@@ -114,7 +102,3 @@ class TaylorKernels(MethodKernels):
     def count(self, counters: Counters, steps: int, result: Any) -> None:
         """Add the cost of the steps to the counters of the run."""
         counters.rhs_evaluations += 2 * steps  # one series and one check per step
-
-    def block(self, result: Any, rows: StepRows, last_steps: np.ndarray, *record: np.ndarray) -> SeriesBlock:
-        """Return the segments that one call of the compiled loop has stored."""
-        return SeriesBlock(self.recorded, last_steps, *rows, *record)

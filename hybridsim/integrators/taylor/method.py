@@ -21,7 +21,7 @@ from hybridsim.engine.system.programs.mode_code import computed_rates, fading
 from hybridsim.engine.system.series_at import SeriesRun
 from hybridsim.engine.system.system import System
 from hybridsim.engine.system.tolerances import Tolerances
-from hybridsim.integrators.contract import NEEDS_TAPE, Integrator
+from hybridsim.integrators.contract import EXPLICIT, NEEDS_TAPE, Integrator
 from hybridsim.integrators.taylor.compiled_loop import TaylorKernels
 
 _SMALLEST = 10.0  # a remainder of fewer ulps of the local time is merged into the last step
@@ -169,7 +169,7 @@ class Taylor(Integrator):
     reference: ClassVar[str] = "Jorba and Zou 2005, doi:10.1080/10586458.2005.10128904"
     when: ClassVar[str] = "highest accuracy; smooth modes, not stiff"
     lacks: ClassVar[dict[str, str]] = {
-        "stiff": "it is explicit: the fastest rate limits its step",
+        **EXPLICIT,
         "corners": "its series do not detect a jump inside a mode ('hybridsim check' names the jump)",
         "functions": NEEDS_TAPE,
     }
