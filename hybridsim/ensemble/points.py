@@ -63,10 +63,7 @@ class Fixed(NamedTuple):
 
 
 class PeriodSummary(NamedTuple):
-    """The measures of one period at one point; with a leading axis, the measures at several points.
-
-    All but the last field are those of `hybridsim.engine.linear.motion_summary.MotionSummary`.
-    """
+    """The measures of one period at one point; with a leading axis, the measures at several points."""
 
     extremes: np.ndarray  # (2, n) smallest and largest value of each state
     integrals: np.ndarray  # (2, n) of x and x**2

@@ -126,14 +126,9 @@ def _fixed(system: System) -> Fixed:
 
 def _call_arrays(system: System, tapes: Any, tables: Any, p: np.ndarray) -> CallArrays:
     """Return the arrays of a call of the event loop."""
-    none, count, guards = np.zeros(0, dtype=np.int64), len(system.automata), system.guard_count
-    blank = Outcome(
-        np.zeros(system.n), p.copy(), np.zeros(count, dtype=np.int64), np.ones(guards, dtype=np.int64),
-        np.zeros(guards, dtype=np.int64), none, none, np.zeros(system.n), np.zeros(guards), np.zeros(0),
-    )  # fmt: skip
     kernels = ClosedFormKernels(system, math.inf)
     kernels.lin = tables
-    return CallArrays(kernels, HybridState.of(blank, p), tapes, tables)
+    return CallArrays(kernels, HybridState.of(Outcome.blank(system, p.copy()), p), tapes, tables)
 
 
 def _search_scratch(n: int, components: int, monomials: int, found: Any) -> SearchScratch:
@@ -141,17 +136,12 @@ def _search_scratch(n: int, components: int, monomials: int, found: Any) -> Sear
     return SearchScratch(
         states=np.empty((MOST_FOLLOWED, n)),
         modes=np.empty(components, dtype=np.int64),
-        scale=np.empty(n),
-        seen=np.empty(n),
-        last=np.empty(n),
+        **{name: np.empty(n) for name in ("scale", "seen", "last")},
         rows=np.empty((n, n + 1)),
         map=packed(
             MapScratch(
                 matrix=np.empty((n, n)),
-                column=vector_of(n),
-                after=vector_of(n),
-                before_rates=vector_of(n),
-                after_rates=vector_of(n),
+                **{name: vector_of(n) for name in ("column", "after", "before_rates", "after_rates")},
                 no_time=vector_of(monomials),
             )
         ),

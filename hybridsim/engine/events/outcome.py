@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from hybridsim.engine.system.system import System
+
 _STATE = (
     "x", "p", "z", "sides", "orders", "monitor_sides", "monitor_orders", "x_error", "guard_floors", "monitor_floors",
 )  # fmt: skip
@@ -69,6 +71,14 @@ class Outcome:
         """Return an outcome with copies of the given arrays."""
         state: dict[str, Any] = {name: arrays[name].copy() for name in _STATE}
         return cls(**state, continuous=bool(arrays["continuous"]))
+
+    @classmethod
+    def blank(cls, system: System, p: np.ndarray) -> Outcome:
+        """Return an outcome with zero states and first modes, with all guards positive and without monitors."""
+        guards, n, whole = system.guard_count, system.n, np.int64
+        x, modes, none = np.zeros(n), np.zeros(len(system.automata), dtype=whole), np.zeros(0, dtype=whole)
+        sides, orders = np.ones(guards, dtype=whole), np.zeros(guards, dtype=whole)
+        return cls(x, p, modes, sides, orders, none, none, np.zeros(n), np.zeros(guards), np.zeros(0))
 
     def leave_zeros(self) -> None:
         """Mark all guards as positive and all monitors as different from zero."""

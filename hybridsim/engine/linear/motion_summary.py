@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -18,16 +18,6 @@ _GROWN = 4.0  # largest growth of the coordinates between nodes, which are less 
 _UNSEEN = 1e-15  # relative to a state's size: smaller extrema are ignored
 _ITERATIONS = 60  # most iterations of a secant method that bisects in the worst case
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(_NODES)
-
-
-class MotionSummary(NamedTuple):
-    """Accumulated measures of the states and the holding modes over several segments."""
-
-    extremes: np.ndarray  # (2, n) smallest and largest value of each state
-    integrals: np.ndarray  # (2, n) of x and x**2
-    ends: np.ndarray  # (2, n) states at the beginning and the end
-    held: np.ndarray  # (2, C) time in the holding mode, and number of its intervals, by component
-    holding: np.ndarray  # (2, C) whether the component holds at the beginning and at the end
 
 
 @inlined
@@ -143,11 +133,11 @@ def sum_up(
     lin: Any, hold: Any, record: Any, first: int, last: int, begin: float, nodes: Any, weights: Any, scratch: Any,
     out: Any,
 ) -> bool:  # fmt: skip
-    """Add segments of a record to a `MotionSummary`; of the first one, only the part after local time `begin`.
+    """Add segments of a record to a summary; of the first one, only the part after local time `begin`.
 
     record: ends, rows, modes, coordinates, jumps as written by `hybridsim.integrators.closed_form.segments`;
-    hold: holding mode of each component. scratch: v (J,); slopes and bounds of third derivatives (3, n). Return
-    False if a segment oscillates too often.
+    hold: holding mode of each component. scratch: v (J,); slopes and bounds of third derivatives (3, n). out: as
+    `hybridsim.ensemble.points.PeriodSummary`. Return False if a segment oscillates too often.
     """
     ends, rows, modes, coordinates, jumps = record
     v, slopes = scratch

@@ -66,19 +66,18 @@ def compile_loops(system: System, make: Callable[[System, Tolerances, float], Me
     if make in _compiled or not system.n:
         return
     kernels = make(system, Tolerances(1e-3, np.full(system.n, 1e-3)), np.inf)
-    nowhere, none = Instant(0.0), np.zeros(0, dtype=np.int64)
-    guards, n = system.guard_count, system.n
-    modes = np.zeros(len(system.automata), dtype=np.int64)
+    nowhere = Instant(0.0)
     p = system.vector(nowhere, np.zeros(system.layout.discrete))
-    still = Outcome(
-        np.zeros(n), p, modes, np.ones(guards, dtype=np.int64), np.zeros(guards, dtype=np.int64), none, none,
-        np.zeros(n), np.zeros(guards), np.zeros(0),
-    )  # fmt: skip
+    still = Outcome.blank(system, p)
     # a rate may not be a number here; the run reports such an error itself
     with suppress(StepFailure):
         CompiledLoop(kernels).advance(nowhere, still, p, nowhere, Trajectory(system))
         cannot_accumulate(
-            np.empty((0, 2)), none, system.owner, len(system.automata), np.empty((2, MAX_EVENTS_PER_TURN))
+            np.empty((0, 2)),
+            _NO_OWNERS,
+            system.owner,
+            len(system.automata),
+            np.empty((2, MAX_EVENTS_PER_TURN)),
         )
         _compiled.append(make)
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from hybridsim.engine.native.model_functions import evaluate, evaluate_rows
+from hybridsim.engine.native.model_functions import evaluate
 from hybridsim.engine.record.counters import Counters
 from hybridsim.engine.record.segments import Dense
 from hybridsim.engine.system.system import System
@@ -90,11 +90,8 @@ class Flow:
         """Return the Jacobian (n, n) of the rates: exact for expressions, else by differences."""
         if not self.system.has_tape:
             return self.system.jacobian(float(s), np.ascontiguousarray(x, dtype=float), self.p, self.z)
-        tangent, columns, both = (
-            self.system.address("tangent"),
-            np.empty((self.n, self.n)),
-            np.zeros(2 * self.n),
-        )
+        tangent = self.system.address("tangent")
+        columns, both = np.empty((self.n, self.n)), np.zeros(2 * self.n)
         both[: self.n] = x
         for k in range(self.n):
             both[self.n :] = 0.0
@@ -104,8 +101,9 @@ class Flow:
 
     def project(self, s: np.ndarray, x: np.ndarray) -> np.ndarray:
         """Return states (k, n) at local times (k,), with held states computed from their constraints."""
-        x = np.ascontiguousarray(x, dtype=float)
-        return self.system.rows("project", self.n, s, x, self.p, self.z) if self.system.can_hold else x
+        if not self.system.can_hold:
+            return np.ascontiguousarray(x, dtype=float)
+        return self._rows("project", self.n, s, x)
 
     def landed(self, s: float, x: np.ndarray) -> np.ndarray:
         """Return the end of a step, moved back onto the surfaces on which projection keeps the states."""
@@ -118,19 +116,14 @@ class Flow:
     def guards(self, s: np.ndarray, x: np.ndarray) -> np.ndarray:
         """Return guard values (k, guards) at times and states, with held states on their constraints."""
         self.counters.guard_evaluations += len(s)
-        out = np.empty((len(s), self.system.guard_count))
-        evaluate_rows(
-            self.system.address("guards"), s, np.ascontiguousarray(x, dtype=float), self.p, self.z, out
-        )
-        return out
+        return self._rows("guards", self.system.guard_count, s, x)
 
     def monitors(self, s: np.ndarray, x: np.ndarray) -> np.ndarray:
         """Return monitor values (k, monitors) at times and states, with held states on their constraints."""
-        out = np.empty((len(s), len(self.system.monitor_names)))
-        evaluate_rows(
-            self.system.address("monitors"), s, np.ascontiguousarray(x, dtype=float), self.p, self.z, out
-        )
-        return out
+        return self._rows("monitors", len(self.system.monitor_names), s, x)
+
+    def _rows(self, name: str, count: int, s: np.ndarray, x: np.ndarray) -> np.ndarray:
+        return self.system.rows(name, count, s, np.ascontiguousarray(x, dtype=float), self.p, self.z)
 
 
 class Stepper(Protocol):

@@ -118,11 +118,7 @@ class ClosedFormKernels(MethodKernels):
         _, self.horizon, self.hints = result
 
     def block(
-        self,
-        result: Any,
-        rows: ClosedFormRows,
-        last_steps: np.ndarray,
-        *record: np.ndarray,
+        self, result: Any, rows: ClosedFormRows, last_steps: np.ndarray, *record: np.ndarray
     ) -> ClosedFormBlock:
         """Return the segments that one call of the compiled loop has stored."""
         return ClosedFormBlock(self.recorded, result[0], rows.rows, rows.ends, rows.coordinates, *record)
@@ -140,22 +136,17 @@ class ClosedFormKernels(MethodKernels):
     @place.setter
     def place(self, place: np.ndarray) -> None:
         guards, components = self.system.guard_count, len(self.system.automata)
-        what = "the last zeros of guards"
         whole = len(place) >= 2 and 0.0 <= place[0] < math.inf and 0.0 <= place[1] <= len(place)
         if not whole or len(place) != 2 + int(place[1]) * (components + guards):
             raise damaged("the stored zeros of guards are wrong")
         self.horizon, count = float(place[0]), int(place[1])
+        vectors = place[2 : 2 + count * components].reshape(count, components)
         try:
-            check_modes(
-                what,
-                place[2 : 2 + count * components].reshape(count, components),
-                [len(a.modes) for a in self.system.automata],
-            )
+            check_modes("the last zeros of guards", vectors, [len(a.modes) for a in self.system.automata])
         except ValueError:
             raise damaged("the stored zeros of guards are wrong") from None
-        vectors = place[2 : 2 + count * components].reshape(count, components).astype(np.int64)
         hints = place[2 + count * components :].reshape(count, guards)
         is_known = (hints > 0.0).any(axis=1)
-        rows = self.tape_cache.rows_of(vectors[is_known])
+        rows = self.tape_cache.rows_of(vectors[is_known].astype(np.int64))
         self.hints = np.zeros((max(rows.tolist(), default=-1) + 1, guards))
         self.hints[rows] = hints[is_known]

@@ -57,9 +57,8 @@ _DONE = -1.0  # replaces a guard's size if its first zero is known
 class ClosedFormArrays(NamedTuple):
     """The arrays of the segment kernel, for J modal coordinates and K combinations of modes."""
 
-    points: (
-        np.ndarray
-    )  # number of points from which guards were followed, now and at the start of the segment
+    # number of points from which guards were followed, now and at the start of the segment
+    points: np.ndarray
     c: np.ndarray  # (J,) modal coordinates
     v: np.ndarray  # (J,) modal coordinates
     sizes: np.ndarray  # (J,) sizes of modal coordinates

@@ -132,10 +132,7 @@ class MoreauMarch(March):
             evaluated[k, [*system.pins.get(c, ()), *system.projected.get(c, ())]] = 1
         nominal = np.array([s.nominal or 0.0 for s in system.model.states])
         sizes = np.where(nominal > 0.0, nominal, np.where(x0 != 0.0, np.abs(x0), 1.0))
-        self._scratch = scratch_for(
-            system.n, len(table), len(system.automata), len(system.quantities), system.guard_count,
-            len(system.monitor_names), sizes, evaluated,
-        )  # fmt: skip
+        self._scratch = scratch_for(system, len(table), sizes, evaluated)
 
     def run(
         self,
@@ -158,18 +155,8 @@ class MoreauMarch(March):
         """Return the state after one step of length `tau`."""
         out = np.empty(len(x))
         moreau_step(
-            self._functions,
-            self._settings,
-            self._table,
-            s,
-            tau,
-            x,
-            p,
-            z.copy(),
-            out,
-            self._scratch,
-            self.counts,
-        )
+            self._functions, self._settings, self._table, s, tau, x, p, z.copy(), out, self._scratch, self.counts
+        )  # fmt: skip
         return out
 
     def refused(self) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 from hybridsim.engine.native.kernels import call, inlined, kernel
 from hybridsim.engine.native.loop_hints import put
 from hybridsim.engine.native.struct_pack import packed
+from hybridsim.engine.system.system import System
 from hybridsim.integrators.fixed_step.kernels import (
     BOUND,
     CONTINUES,
@@ -83,21 +84,14 @@ class Scratch(NamedTuple):
     evaluated: np.ndarray  # (m, n) states that a closed gap evaluates
 
 
-def scratch_for(
-    n: int,
-    surfaces: int,
-    components: int,
-    quantities: int,
-    guards: int,
-    monitors: int,
-    sizes: Any,
-    evaluated: Any,
-) -> Any:
+def scratch_for(system: System, surfaces: int, sizes: np.ndarray, evaluated: np.ndarray) -> Any:
     """Allocate the scratch arrays of one run.
 
     sizes (n,): sizes of the states, for difference quotients and convergence tests. evaluated (m, n): see
     `Scratch`.
     """
+    n, components, quantities = system.n, len(system.automata), len(system.quantities)
+    guards, monitors = system.guard_count, len(system.monitor_names)
     none = max(surfaces, 1)  # compiled functions write at least one element
     of_components = {name: np.zeros(components, dtype=np.int64) for name in ("sides", "trial")}
     of_states = {name: np.zeros(n) for name in ("a", "a_old", "on", "rates", "nudged", "X", "free")}
@@ -128,14 +122,8 @@ def take_apart(
     as in `surface_table`, plus the quantity and whether it is a gap. `scratch.sides` receives the modes at x
     with all gaps open: normal forces are separated, too.
     """
-    sides, trial, a, on, rates, q = (
-        scratch.sides,
-        scratch.trial,
-        scratch.a,
-        scratch.on,
-        scratch.rates,
-        scratch.quantities,
-    )
+    sides, trial, a = scratch.sides, scratch.trial, scratch.a
+    on, rates, q = scratch.on, scratch.rates, scratch.quantities
     put(z, sides)
     for k in range(table.shape[0]):
         sides[table[k, 0]] = table[k, _ABOVE]

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from hybridsim.engine.native.kernels import call, inlined, kernel
+from hybridsim.engine.system.system import System
 from hybridsim.integrators.fixed_step.kernels import BOUND, CONTINUES, FULL, RESTED, brought_to_zero, passed
 
 
@@ -19,14 +20,14 @@ def _any_held(table: Any, z: Any) -> bool:
     return False
 
 
-def workspace(n: int, surfaces: int, guards: int, monitors: int, rows: int) -> tuple[np.ndarray, ...]:
+def workspace(system: System, surfaces: int, rows: int) -> tuple[np.ndarray, ...]:
     """Allocate the scratch arrays of the kernels.
 
     Surface values and eps; results of a step (see `step_code`); guard values; monitor values at both ends of a step.
     """
-    return tuple(
-        np.zeros(max(size, 1)) for size in (surfaces + 3 + rows, n + surfaces + 2, guards, monitors, monitors)
-    )
+    monitors = len(system.monitor_names)
+    sizes = (surfaces + 3 + rows, system.n + surfaces + 2, system.guard_count, monitors, monitors)
+    return tuple(np.zeros(max(size, 1)) for size in sizes)
 
 
 @inlined
@@ -45,12 +46,6 @@ def _released(values: Any, table: Any, z: Any) -> bool:
         if z[table[k, 0]] == table[k, 3] and (values[table[k, 4]] < 0.0 or values[table[k, 5]] < 0.0):
             return True
     return False
-
-
-@kernel
-def rk4_step(address: Any, s: float, x: Any, p: Any, z: Any, out: Any) -> None:
-    """Take one step with the functions that `step_code` writes."""
-    call(address, s, x, p, z, out)
 
 
 @kernel

@@ -9,11 +9,12 @@ from typing import cast
 import numpy as np
 
 from hybridsim.engine.native.kernels import ENABLED, Precompiled
+from hybridsim.engine.native.model_functions import evaluate
 from hybridsim.engine.system.system import System
 from hybridsim.integrators.fixed_step.march import March
-from hybridsim.integrators.fixed_step.rk4_kernels import rk4_step, run_steps, workspace
+from hybridsim.integrators.fixed_step.rk4_kernels import run_steps, workspace
 from hybridsim.integrators.fixed_step.run import ROWS, surface_table
-from hybridsim.integrators.fixed_step.step_code import SIGN, StepCode, step_functions
+from hybridsim.integrators.fixed_step.step_code import SIGN, ZONE, StepCode, step_functions
 
 _run_steps = Precompiled(run_steps)
 
@@ -25,7 +26,6 @@ class FixedStep:
     step: float
     rule: int
     every_stage: bool
-    dichotomy: bool
     zeroed: bool
     located: bool
     rest_of_step: bool
@@ -53,15 +53,13 @@ class Rk4March(March):
         self._settings = (float(settings.step), settings.halvings, float(settings.eps))
         has_march = ENABLED and not settings.located and not system.monitor_names
         self._flags = (
-            settings.dichotomy,
+            settings.rule == ZONE,
             settings.zeroed,
             settings.located,
             settings.rest_of_step,
             has_march,
         )
-        self._work = workspace(
-            system.n, len(self._table), system.guard_count, len(system.monitor_names), ROWS
-        )
+        self._work = workspace(system, len(self._table), ROWS)
 
     def run(
         self,
@@ -85,6 +83,6 @@ class Rk4March(March):
         """Return the state after one step of length `tau`."""
         out = self._work[1]
         out[-2:] = tau, self._settings[2]
-        rk4_step(self._addresses[1], s, x, p, z, out)
+        evaluate(self._addresses[1], s, x, p, z, out)
         self.counts[0] += 4
         return out[: len(x)].copy()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -73,11 +72,7 @@ class RosenbrockStepper(OneStepStepper):
         super().__init__(flow, x0, bound, tolerances, first_step, tableau.order, tableau.error_order)
 
     def _point(self, s: float, x: np.ndarray) -> RosenbrockPoint:
-        return RosenbrockPoint(self.flow, s, x, self._linearised)
-
-    def _linearised(self, s: float, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        self.flow.counters.rhs_evaluations += self.flow.n + 1
-        return self._linearisation.at(s, x)
+        return RosenbrockPoint(self.flow, s, x, self._linearisation)
 
     def attempt(self, start: Point, h: float) -> Trial:
         assert isinstance(start, RosenbrockPoint)
@@ -85,19 +80,9 @@ class RosenbrockStepper(OneStepStepper):
         stages = np.empty((len(tableau.nodes), flow.n))
         flow.counters.rhs_evaluations += len(tableau.nodes)
         error = rosenbrock_attempt(
-            self._address,
-            tableau.arrays,
-            start.s,
-            h,
-            start.x,
-            *start.linear,
-            flow.p,
-            flow.z,
-            self.control,
-            *self._scratch,
-            stages,
-            out,
-        )
+            self._address, tableau.arrays, start.s, h, start.x, *start.linear, flow.p, flow.z, self.control,
+            *self._scratch, stages, out,
+        )  # fmt: skip
         return Trial(out, error, stages)
 
     def holds(self, start: Point, end: Point, trial: Trial) -> bool:
@@ -124,17 +109,12 @@ class RosenbrockStepper(OneStepStepper):
 class RosenbrockPoint(Point):
     """A point with the linearisation of the flow: Jacobian (n, n) and time derivative (n,)."""
 
-    def __init__(
-        self,
-        flow: Flow,
-        s: float,
-        x: np.ndarray,
-        linearised: Callable[[float, np.ndarray], tuple[np.ndarray, np.ndarray]],
-    ) -> None:
+    def __init__(self, flow: Flow, s: float, x: np.ndarray, linearisation: Linearisation) -> None:
         super().__init__(flow, s, x)
-        self._linearised = linearised
+        self._linearisation = linearisation
 
     @cached_property
     def linear(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the linearisation of the flow, computed on first use."""
-        return self._linearised(self.s, self.x)
+        self.flow.counters.rhs_evaluations += self.flow.n + 1
+        return self._linearisation.at(self.s, self.x)

@@ -72,11 +72,10 @@ class NativeStepper:
                     first_step=first_step,
                     **({"jac": flow.jacobian} if implicit else {}),
                 )
-            # from its root finder, or from a matrix that is not finite
             except (
                 RuntimeError,
                 ValueError,
-            ) as failure:
+            ) as failure:  # from its root finder, or a matrix that is not finite
                 raise StepFailure(f"solve_ivp raises {type(failure).__name__}: {failure}") from None
         self.failure = result.message if result.status < 0 else ""
         self.steps = iter(self._cut(result, guards, monitors))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -60,30 +61,15 @@ class ScipyIntegrator(Integrator):
             return NativeStepper(solver, self.implicit, flow, x0, s_bound, tolerances, first_step, watch)
         if self.starts_blind:
             first_step = min(first_step or np.inf, series_step(flow, x0, s_bound, tolerances))
-        if self.is_multistep:
-            return with_first_steps(
-                flow,
-                x0,
-                s_bound,
-                tolerances,
-                watch,
-                lambda s, x: SolverStepper(
-                    solver,
-                    self.implicit,
-                    flow,
-                    x,
-                    s_bound,
-                    tolerances,
-                    self._first(first_step, s_bound - s),
-                    s,
-                ),
-                self.keeps_low,
-            )
-        return SolverStepper(solver, self.implicit, flow, x0, s_bound, tolerances, first_step)
+        make = partial(SolverStepper, solver, self.implicit, flow)
+        if not self.is_multistep:
+            return make(x0, s_bound, tolerances, first_step)
 
-    def _first(self, first_step: float | None, left: float) -> float | None:
-        """Return a first step that is not longer than the remaining segment."""
-        return None if first_step is None else min(first_step, abs(left))
+        def go_on(s: float, x: np.ndarray) -> Stepper:
+            first = None if first_step is None else min(first_step, abs(s_bound - s))
+            return make(x, s_bound, tolerances, first, s)
+
+        return with_first_steps(flow, x0, s_bound, tolerances, watch, go_on, self.keeps_low)
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ import math
 import os
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from typing import ClassVar
 
 import numpy as np
@@ -49,11 +49,11 @@ class CvodeStepper:
         self,
         method: str,
         flow: Flow,
-        x0: np.ndarray,
         bound: float,
         tolerances: Tolerances,
         first_step: float | None,
-        origin: tuple[float, np.ndarray] | None = None,
+        s: float,
+        x: np.ndarray,
     ) -> None:
         from sksundae.cvode import CVODE
 
@@ -78,10 +78,10 @@ class CvodeStepper:
             max_step=0.0 if np.isinf(tolerances.max_step) else tolerances.max_step,
             max_num_steps=_MAX_STEPS,
         )
-        self.s, self.x = (0.0, x0) if origin is None else origin
-        angles = np.sin(self.phases + self.rates * self.s)
-        self.solver.init_step(self.s, np.concatenate([self.x, angles]))
-        self.past_times, self.past_states = [self.s], [self.x]
+        self.s, self.x = s, x
+        angles = np.sin(self.phases + self.rates * s)
+        self.solver.init_step(s, np.concatenate([x, angles]))
+        self.past_times, self.past_states = [s], [x]
         # the series at the end of the last step with computed dense output
         self.last_series = math.nan, np.zeros((0, 0))
 
@@ -109,10 +109,8 @@ class CvodeStepper:
 
     def _dense(self, s0: float, s1: float, x0: np.ndarray, x1: np.ndarray) -> Dense:
         """Return dense output that is computed on first use."""
-        self.past_times, self.past_states = (
-            [*self.past_times, s1][-MAX_PAST_POINTS:],
-            [*self.past_states, x1][-MAX_PAST_POINTS:],
-        )
+        self.past_times = [*self.past_times, s1][-MAX_PAST_POINTS:]
+        self.past_states = [*self.past_states, x1][-MAX_PAST_POINTS:]
         times, states = np.array(self.past_times), np.array(self.past_states)
 
         def make() -> Dense:
@@ -161,14 +159,8 @@ class _Cvode(Integrator):
         watch: Watch,
     ) -> Stepper:
         """Begin to integrate the motion up to the next event."""
-        return with_first_steps(
-            flow,
-            x0,
-            s_bound,
-            tolerances,
-            watch,
-            lambda s, x: CvodeStepper(self.formulas, flow, x0, s_bound, tolerances, first_step, (s, x)),
-        )
+        make = partial(CvodeStepper, self.formulas, flow, s_bound, tolerances, first_step)
+        return with_first_steps(flow, x0, s_bound, tolerances, watch, make)
 
 
 @dataclass(frozen=True)

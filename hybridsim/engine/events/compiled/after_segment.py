@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from hybridsim.engine.events.compiled.guard_series import interpreted_series
+from hybridsim.engine.events.compiled.guard_series import link_interpreted_series
 from hybridsim.engine.events.compiled.resolve_impact import resolve_impact
 from hybridsim.engine.events.compiled.resolve_ordinary import resolve_event
-from hybridsim.engine.events.compiled.scratch import AT, AT_ERROR, FIRED, IMPACT, NOBODY, RESOLVE, SERIES
+from hybridsim.engine.events.compiled.scratch import AT, AT_ERROR, FIRED, IMPACT, NOBODY, RESOLVE
 from hybridsim.engine.events.zeno.accumulation import CLOSING_IN
 from hybridsim.engine.native.kernels import call_kernel, inlined, kernel, kernel_address
 from hybridsim.engine.native.loop_hints import index, short_loop
@@ -134,10 +134,8 @@ def moved_on(high: float, low: float, s: float) -> tuple[float, float]:
 
 def link_event_resolution(model: Any, state: Any, work: Any) -> None:
     """Compile the kernel that resolves events, and store the addresses of all kernels that it calls."""
-    x, (automata, tapes, inputs, lin) = work.y, (model.automata, model.tapes, model.inputs, model.lin)
-    work.entry_points[SERIES] = kernel_address(
-        interpreted_series, tapes, inputs, 0, 0.0, 0.0, x, x, state.p, work
-    )
+    automata, tapes, inputs, lin = model.automata, model.tapes, model.inputs, model.lin
+    link_interpreted_series(tapes, inputs, state, work)
     if automata.is_unilateral.any():
         work.entry_points[IMPACT] = kernel_address(
             resolve_impact, automata, tapes, inputs, lin, state, work, 0

@@ -7,7 +7,7 @@ from typing import Any
 from hybridsim.engine.events.choice.verdict import RELEASED, UNCHANGED, is_smooth, kind_of_change
 from hybridsim.engine.events.compiled.scratch import SERIES, called_by
 from hybridsim.engine.linear.guard_coefficients import has_tables
-from hybridsim.engine.native.kernels import array_at, call, call_kernel, call_series, inlined
+from hybridsim.engine.native.kernels import array_at, call, call_kernel, call_series, inlined, kernel_address
 from hybridsim.engine.series.bounded import run_series
 
 
@@ -30,6 +30,14 @@ def interpreted_series(
         for j in range(judged.shape[2]):
             judged[0, g, j], judged[1, g, j] = V[r, j], E[r, j]
     return 0
+
+
+def link_interpreted_series(tapes: Any, inputs: Any, state: Any, work: Any) -> None:
+    """Compile `interpreted_series`, and store its address for other kernels."""
+    x = work.y
+    work.entry_points[SERIES] = kernel_address(
+        interpreted_series, tapes, inputs, 0, 0.0, 0.0, x, x, state.p, work
+    )
 
 
 @inlined

@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybridsim.engine.events.choice.verdict import FINE, NO_SIDE
+from hybridsim.engine.events.choice.verdict import NO_SIDE
 from hybridsim.engine.events.compiled.guard_series import guard_series
-from hybridsim.engine.events.compiled.resolve_surface import row_verdict
+from hybridsim.engine.events.compiled.resolve_surface import take_fine_row
 from hybridsim.engine.events.compiled.scratch import LocatedEvent, row_of
 from hybridsim.engine.events.compiled.start import StartScratch, judged
 from hybridsim.engine.events.state import HybridState
@@ -90,11 +90,7 @@ def admit_modes(
     for g in range(state.sides.shape[0]):
         work.is_zero[g] = False
     guard_series(tapes, inputs, none, k, LocatedEvent(0.0, _LEAST, x, x_error, state.p, z), x, x_error, work)
-    verdict = row_verdict(automata, none, k, z, work.everything, True, 0, work)
-    put(work.all_sides[0], state.sides)
-    put(work.all_orders[0], state.orders)
-    put(work.all_floors[0], state.floors)
-    return verdict == FINE
+    return take_fine_row(automata, none, k, z, True, state, work)
 
 
 @per_structure

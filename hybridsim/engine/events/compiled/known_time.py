@@ -11,10 +11,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybridsim.engine.events.choice.verdict import FINE
 from hybridsim.engine.events.compiled.after_segment import STAGES
 from hybridsim.engine.events.compiled.guard_series import guard_series
-from hybridsim.engine.events.compiled.resolve_surface import row_verdict
+from hybridsim.engine.events.compiled.resolve_surface import take_fine_row
 from hybridsim.engine.events.compiled.scratch import (
     DISCRETE,
     DISCRETE_AT,
@@ -208,14 +207,11 @@ def resolve_known_time(model: Any, loop: Any, state: Any, work: Any, k: int, s: 
         errors_of_time(lin, 0.0, work.factors, work.w_error)
         measure_point(lin, work)
     guard_series(tapes, inputs, lin, k, LocatedEvent(0.0, 0.0, x, x_error, p, z), x, x_error, work)
-    if row_verdict(automata, lin, k, z, work.everything, True, 0, work) != FINE:
+    if not take_fine_row(automata, lin, k, z, True, state, work):
         return 0
     put(x, state.x)
     put(x_error, state.x_error)
     put(p, state.p)
-    put(work.all_sides[0], state.sides)
-    put(work.all_orders[0], state.orders)
-    put(work.all_floors[0], state.floors)
     for i in range(polynomials.shape[0]):
         known.starts[i, 0], known.starts[i, 1] = polynomials[i, START], polynomials[i, START + 1]
     return 1

@@ -48,6 +48,17 @@ def row_verdict(
     return found
 
 
+@inlined
+def take_fine_row(automata: Any, lin: Any, k: int, z: Any, continuous: bool, state: Any, work: Any) -> bool:
+    """Take over the signs of the guards in the modes of row `k`, and return True, if these modes are admissible."""
+    if row_verdict(automata, lin, k, z, work.everything, continuous, 0, work) != FINE:
+        return False
+    put(work.all_sides[0], state.sides)
+    put(work.all_orders[0], state.orders)
+    put(work.all_floors[0], state.floors)
+    return True
+
+
 @inline_always
 def choose_modes(
     automata: Any,

@@ -12,15 +12,13 @@ from typing import Any
 import numpy as np
 
 from hybridsim.engine.events.choice.joint_choice import is_below_limit
-from hybridsim.engine.events.choice.verdict import FINE
-from hybridsim.engine.events.compiled.guard_series import guard_series, interpreted_series
-from hybridsim.engine.events.compiled.resolve_surface import choose_modes, cluster_of, row_verdict
+from hybridsim.engine.events.compiled.guard_series import guard_series, link_interpreted_series
+from hybridsim.engine.events.compiled.resolve_surface import choose_modes, cluster_of, take_fine_row
 from hybridsim.engine.events.compiled.scratch import (
     AT,
     AT_ERROR,
     LACKS_TAPE,
     MAX_JOINT_COMPONENTS,
-    SERIES,
     LocatedEvent,
     called_by,
     located,
@@ -30,7 +28,7 @@ from hybridsim.engine.events.compiled.scratch import (
 from hybridsim.engine.events.outcome import Outcome
 from hybridsim.engine.events.state import HybridState
 from hybridsim.engine.linear.tables import no_tables
-from hybridsim.engine.native.kernels import ENABLED, Precompiled, call, inline_always, kernel, kernel_address
+from hybridsim.engine.native.kernels import ENABLED, Precompiled, call, inline_always, kernel
 from hybridsim.engine.native.loop_hints import put
 from hybridsim.engine.native.struct_pack import packed
 from hybridsim.engine.series.bounded import UNIT, run_series
@@ -68,11 +66,7 @@ def plain_start(
         return False
     at = LocatedEvent(0.0, 0.0, x, x_error, p, z)
     guard_series(tapes, inputs, none, k, at, x, x_error, work)
-    verdict = row_verdict(automata, none, k, z, work.everything, False, 0, work)
-    put(work.all_sides[0], state.sides)
-    put(work.all_orders[0], state.orders)
-    put(work.all_floors[0], state.floors)
-    return verdict == FINE
+    return take_fine_row(automata, none, k, z, False, state, work)
 
 
 @inline_always
@@ -166,12 +160,7 @@ class StartScratch:
     """The arrays of a call that judges combinations of modes at a point without an event."""
 
     def __init__(self, system: System, tapes: Tapes) -> None:
-        n, count, guards, whole = system.n, len(system.automata), system.guard_count, np.int64
-        none = np.zeros(0, dtype=whole)
-        blank = Outcome(
-            np.zeros(n), np.zeros(system.layout.size), np.zeros(count, dtype=whole), np.ones(guards, dtype=whole),
-            np.zeros(guards, dtype=whole), none, none, np.zeros(n), np.zeros(guards), np.zeros(0),
-        )  # fmt: skip
+        blank = Outcome.blank(system, np.zeros(system.layout.size))
         self.state = HybridState.of(blank, blank.p)
         self.as_packed, self.work, self.nothing = self.state.packed(), work_space(system), no_tables()
         # the code for short series does not know the roundoff of numbers, as it counts at a start
@@ -180,18 +169,7 @@ class StartScratch:
         self.inputs, self.values = system.registers.rounded()
         self.filled = b""  # the run-time vector in `values`
         self.automata, self.surfaces = automata_of(system), surfaces_of(system)
-        self.work.entry_points[SERIES] = kernel_address(
-            interpreted_series,
-            self.tapes,
-            self.inputs,
-            0,
-            0.0,
-            0.0,
-            self.work.y,
-            self.work.y,
-            self.state.p,
-            self.work,
-        )
+        link_interpreted_series(self.tapes, self.inputs, self.state, self.work)
 
 
 def judged(system: System, call: Callable[[StartScratch], bool]) -> HybridState | None:
