@@ -78,13 +78,8 @@ def _hold(automata: Any, z: Any, matrix: Any) -> None:
 @inline_always
 def carry_derivative(packs: Any, lin: Any, count: int, scratch: Any) -> None:
     """Write to `scratch.matrix` the derivative of the last recorded state with respect to the first one."""
-    automata, record, rows, work, own = (
-        packs.model.automata,
-        packs.record,
-        packs.rows,
-        packs.work,
-        packs.own,
-    )
+    automata, record = packs.model.automata, packs.record
+    rows, work, own = packs.rows, packs.work, packs.own
     matrix, column, after = scratch.matrix, scratch.column, scratch.after
     before_rates, after_rates = scratch.before_rates, scratch.after_rates
     n = matrix.shape[0]

@@ -12,9 +12,8 @@ from hybridsim.analysis.polynomials.orbit import NODES, POINTS, TO_COEFFICIENTS,
 from hybridsim.solution import Solution
 
 _TAIL = 4  # last coefficients, which show whether the polynomial is accurate
-_ASIDE_OF_ENDS = (
-    2.0**-26
-)  # of half a interval; samples keep this distance from the ends, where sign(v) may be determined by rounding
+# of half a interval; samples keep this distance from the ends, where sign(v) may be determined by rounding
+_ASIDE_OF_ENDS = 2.0**-26
 _RESOLVED = 1e-13  # the misfit relative to the largest value of the whole run
 _HOLDS = 1e-6  # if rounding exceeds this fraction of a quantity, no polynomial represents it
 _NOISE = 1e-9  # below this fraction, a misfit that halving does not reduce is rounding

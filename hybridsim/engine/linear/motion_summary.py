@@ -200,11 +200,8 @@ def sum_up(
                     if not is_shrinking:
                         slopes[2, i] = _bend(lin, k, i, v, is_shrinking)[1]
                 for i in range(n):
-                    first_rate, last_rate, flat = (
-                        slopes[0, i],
-                        slopes[1, i],
-                        0.5 * slopes[2, i] * (s - before) ** 2,
-                    )
+                    first_rate = slopes[0, i]
+                    last_rate, flat = slopes[1, i], 0.5 * slopes[2, i] * (s - before) ** 2
                     if max(abs(first_rate), abs(last_rate)) < flat:
                         _between(lin, k, i, c, before, s, first_rate, last_rate, v, extremes)
                     elif first_rate * last_rate < 0.0:

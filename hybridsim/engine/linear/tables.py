@@ -58,9 +58,8 @@ class LinearTables(NamedTuple):
     upper: np.ndarray  # (K, J, J) strictly upper part of B
     ends: np.ndarray  # (K, J) end of the block of each coordinate
     basis: np.ndarray  # (K, n, J) from c to the states
-    inverse: (
-        np.ndarray
-    )  # (K, J / 2, ., 4) blocks of rows from y to c, with two numbers per complex coordinate
+    # (K, J / 2, ., 4) blocks of rows from y to c, with two numbers per complex coordinate
+    inverse: np.ndarray
     states: np.ndarray  # (K, ., 2 J, 4) blocks of rows from c to the states
     spreads: np.ndarray  # (K, ., J, 4) blocks of rows from the sizes of c to the sizes of the states' terms
     slopes: np.ndarray  # (K, ., ., 4) blocks of rows from y to the rates of the states
@@ -69,18 +68,15 @@ class LinearTables(NamedTuple):
     rests: np.ndarray  # (K, G, J) bounds of the first omitted coefficient
     farthest: np.ndarray  # (K, G) how far ahead rests holds, up to the factor grown
     grown: np.ndarray  # (K, G) factor on rests within farthest
-    turning: (
-        np.ndarray
-    )  # (K, G) fastest speed or growth rate in the guard, which amplifies roundings with time
+    # (K, G) fastest speed or growth rate in the guard, which amplifies roundings with time
+    turning: np.ndarray
     waves: np.ndarray  # (K, G) coordinate of a guard that is a constant plus one undamped wave, else -1
     margins: np.ndarray  # (K, G) error bound of the guard's terms, relative to sizes
     shares: np.ndarray  # (K, G, Q) coefficients of the products in the guards
-    is_polynomial: (
-        np.ndarray
-    )  # (K, G) 1 for a guard with products, else 0; sizes and rests are those of its linear part
-    product_rests: (
-        np.ndarray
-    )  # (K, Q) bound of the first omitted coefficient of a product of factors of size 1
+    # (K, G) 1 for a guard with products, else 0; sizes and rests are those of its linear part
+    is_polynomial: np.ndarray
+    # (K, Q) bound of the first omitted coefficient of a product of factors of size 1
+    product_rests: np.ndarray
     lasting: np.ndarray  # (K,) how long the motion may be followed from one point
     flows: np.ndarray  # (K, n + M, n + M) from y to its rate
     near: np.ndarray  # (K,) time up to which a state is summed from the series of flows

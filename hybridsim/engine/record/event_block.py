@@ -135,9 +135,7 @@ class EventBlock(Sequence[Occurrence]):
             kinds = np.cumsum([0, *map(len, due)]), np.array([k for one in due for k in one], dtype=np.int64)
         recorded = [m.direction in ways for m in system.model.monitors for ways in _DIRECTIONS]
         may_return = ~system.has_surface | system.is_unilateral  # a reset or an impact
-        arrays = (
-            fired, before, after, system.owner, may_return, *kinds, np.array(recorded, dtype=np.bool_)
-        )  # fmt: skip
+        arrays = fired, before, after, system.owner, may_return, *kinds, np.array(recorded, dtype=np.bool_)
         self._count, self.changes, self._is_plain = _take_part(*arrays, participants)
         if self._count != len(fired):
             participants = np.empty((2, self._count), dtype=np.int64)

@@ -145,9 +145,8 @@ def _first_place(
             continue
         near, far = left * h, (left + width) * h
         begins_low = (u[0] if left == 0.0 else _value(u, order, near)) < 0.0
-        may_matter = (
-            rises if begins_low else not rises or kind == EXPONENTIAL
-        )  # otherwise |u| is largest there
+        # otherwise |u| is largest there
+        may_matter = rises if begins_low else not rises or kind == EXPONENTIAL
         if changes > 0 and may_matter:
             d = _extremum(u, order, near, far, rises)
             value = _value(u, order, d)

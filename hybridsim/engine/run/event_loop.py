@@ -90,9 +90,8 @@ class LoopRecord(NamedTuple):
     vectors: np.ndarray  # (., P) run-time vector
     last_steps: np.ndarray  # number of steps up to the end of the segment
     fires: np.ndarray  # the guard that fired, NO_GUARD, or AT_KNOWN_TIME less the kind of the known time
-    jumps: (
-        np.ndarray
-    )  # (., 2, n) states before and after the end, or (., 3, n), preceded by the state at the start
+    # (., 2, n) states before and after the end, or (., 3, n), preceded by the state at the start
+    jumps: np.ndarray
 
 
 class SegmentStart(NamedTuple):

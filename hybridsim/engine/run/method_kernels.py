@@ -32,9 +32,8 @@ class StepRows(NamedTuple):
     """The stored steps of methods whose dense output is a polynomial in each step."""
 
     steps: np.ndarray  # start and length (S, 2) in local time
-    series: (
-        np.ndarray
-    )  # coefficients (S, n, terms) of the states: from the start of the step, or from both ends
+    # coefficients (S, n, terms) of the states: from the start of the step, or from both ends
+    series: np.ndarray
 
 
 class MethodKernels(ABC):

@@ -29,11 +29,8 @@ _GAIN = np.abs(_WEIGHTS[:, 0]).sum(axis=1) * np.array(
     [2.0, 4.0, 2.0]
 )  # amplification of the rounding of values
 # not a power of two, so that a function with period 1 is not sampled at whole periods
-_SHORTEST, _RATIO, _LEVELS = (
-    0.618 * 2.0**-56,
-    8.0,
-    23,
-)
+_SHORTEST = 0.618 * 2.0**-56
+_RATIO, _LEVELS = 8.0, 23
 _WORSE = 16.0  # ratio to the best bound at which the step counts as too long
 # shift of a state in units of rounding, so that its effect exceeds the noise
 _APART = 2.0**10

@@ -8,9 +8,8 @@ import numpy as np
 
 from hybridsim.errors import UsageError
 
-_PIVOT = (
-    2.0**-49
-)  # per coordinate: a smaller pivot, relative to its diagonal entry, is a rounding error of zero
+# per coordinate: a smaller pivot, relative to its diagonal entry, is a rounding error of zero
+_PIVOT = 2.0**-49
 _ASYMMETRY = 1e-12  # relative to the largest entry; the asymmetry that assembly in doubles may leave
 
 

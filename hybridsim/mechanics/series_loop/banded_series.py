@@ -113,14 +113,8 @@ def expand_run(arrays: Any, laws: Any, state: Any, scratch: Any, count: int, top
     """Compute the series of consecutive nodes: Q (positions), R (relative velocities), F (forces)."""
     orders = scratch.Q.shape[0]  # the same for every request, so that the layout remains valid
     _lay_out(arrays, laws, state, scratch, state.whole[FIRST], count, orders)
-    Q, R, F, W, band_rows, offsets = (
-        scratch.Q,
-        scratch.R,
-        scratch.F,
-        scratch.W,
-        scratch.band_rows,
-        arrays.offsets,
-    )
+    Q, R, F = scratch.Q, scratch.R, scratch.F
+    W, band_rows, offsets = scratch.W, scratch.band_rows, arrays.offsets
     wide, zero, shifts, law = Q.shape[1], splat(0.0), offsets.shape[0], laws.rows.shape[0]
     height, block = _height(arrays), laws.registers[0] * orders * WIDTH
     groups, damped = (
@@ -171,12 +165,8 @@ def law_holds_in_run(arrays: Any, laws: Any, scratch: Any, count: int, share: fl
     sums, W, band_rows = scratch.sums, scratch.W, scratch.band_rows
     orders, wide, height = scratch.Q.shape[0], sums.shape[1], _height(arrays)
     block = laws.registers[0] * orders * WIDTH
-    speed, out, zero, worst = (
-        laws.speed[0] * orders * WIDTH,
-        laws.out[0] * orders * WIDTH,
-        splat(0.0),
-        splat(0.0),
-    )
+    speed, out = laws.speed[0] * orders * WIDTH, laws.out[0] * orders * WIDTH
+    zero, worst = splat(0.0), splat(0.0)
     for g in range(whole_vectors(count) // WIDTH):
         a, slip = g * WIDTH, load(band_rows, g * height + _SLIP * WIDTH)
         store(W, g * block + speed, larger(slip * load(sums, a), zero))

@@ -145,11 +145,8 @@ def constants(arrays: Any, laws: Any, scratch: Any, t: int, last: int, orders: i
 def _forces_of_slip(arrays: Any, laws: Any, state: Any, scratch: Any, orders: int, k: int) -> None:
     """Compute coefficient k of all friction forces in slip from coefficients of the relative velocities."""
     for t in range(laws.registers.shape[0]):
-        first, count, at = (
-            scratch.lane_ptr[t],
-            scratch.lane_ptr[t + 1] - scratch.lane_ptr[t],
-            scratch.place[t],
-        )
+        first = scratch.lane_ptr[t]
+        count, at = scratch.lane_ptr[t + 1] - scratch.lane_ptr[t], scratch.place[t]
         block = laws.registers[t] * orders * WIDTH
         for j in range(whole_vectors(count)):
             i = scratch.lane[first + min(j, count - 1)]
@@ -166,14 +163,8 @@ def _forces_of_slip(arrays: Any, laws: Any, state: Any, scratch: Any, orders: in
 @inlined
 def _relative(arrays: Any, state: Any, scratch: Any, nc: int, k: int) -> None:
     """Compute coefficient k of the relative velocities, which are exactly zero in stick."""
-    cons, loc, mode, ptr, col, val = (
-        scratch.cons,
-        scratch.loc,
-        state.mode,
-        arrays.w_ptr,
-        arrays.w_col,
-        arrays.w_val,
-    )
+    cons, loc, mode = scratch.cons, scratch.loc, state.mode
+    ptr, col, val = arrays.w_ptr, arrays.w_col, arrays.w_val
     q, r, f = scratch.Q[k + 1], scratch.R[k], scratch.F[k]
     for i in range(nc):
         c = cons[i]
@@ -222,13 +213,8 @@ def _accelerate(arrays: Any, scratch: Any, nd: int, k: int) -> None:
 @inlined
 def _advance(arrays: Any, state: Any, scratch: Any, nd: int, k: int) -> None:
     """Compute coefficient k + 2 of the positions from the accelerations or, in stick, from the base."""
-    dofs, acc, pin, q, divisor = (
-        scratch.dofs,
-        scratch.acc,
-        state.pin,
-        scratch.Q[k + 2],
-        float((k + 1) * (k + 2)),
-    )
+    dofs, acc = scratch.dofs, scratch.acc
+    pin, q, divisor = state.pin, scratch.Q[k + 2], float((k + 1) * (k + 2))
     for a in range(nd):
         c = pin[dofs[a]]
         if c < 0:

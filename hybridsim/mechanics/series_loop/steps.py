@@ -275,11 +275,8 @@ def _law_holds(
         share = _DEFECT * rtol + 64.0 * _UNIT
         return laws.rows.shape[0] == 0 or law_holds_in_run(arrays, laws, scratch, nc, share)
     for t in range(laws.registers.shape[0]):
-        first, count, at = (
-            scratch.lane_ptr[t],
-            scratch.lane_ptr[t + 1] - scratch.lane_ptr[t],
-            scratch.place[t],
-        )
+        first = scratch.lane_ptr[t]
+        count, at = scratch.lane_ptr[t + 1] - scratch.lane_ptr[t], scratch.place[t]
         if count == 0 or laws.row_ptr[t + 1] == laws.row_ptr[t]:
             continue
         orders = top + 1

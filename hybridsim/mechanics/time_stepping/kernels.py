@@ -184,12 +184,8 @@ def sweep(arrays: Any, state: Any, scratch: Any, h: float, tolerance: float) -> 
             impulse, mode = 0.0, HOLDS
             if k < nc:
                 impulse = -rate / own
-                up, down, most, least = (
-                    scratch.up[k],
-                    scratch.down[k],
-                    arrays.limits[k, 0],
-                    arrays.limits[k, 1],
-                )
+                up, down = scratch.up[k], scratch.down[k]
+                most, least = arrays.limits[k, 0], arrays.limits[k, 1]
                 if turn > _PATIENCE and scratch.next[k] != HOLDS:
                     most, least = min(most, up), min(least, down)
                 if impulse < -h * most:

@@ -95,11 +95,8 @@ def admit_modes(
 
 @per_structure
 def _surface_tape(system: System, modes: bytes) -> SurfaceTape:
-    tape, inputs, place = (
-        system.optimised_tape(np.frombuffer(modes, dtype=np.int64)),
-        system.registers.inputs,
-        system.layout.discrete_slice,
-    )
+    tape = system.optimised_tape(np.frombuffer(modes, dtype=np.int64))
+    inputs, place = system.registers.inputs, system.layout.discrete_slice
     discrete = set(
         inputs.parameters[(inputs.sources >= place.start) & (inputs.sources < place.stop)].tolist()
     )

@@ -175,14 +175,8 @@ def resolve_known_time(model: Any, loop: Any, state: Any, work: Any, k: int, s: 
     k: row of the modes. s, steps: local time, and number of steps, of the segment that ends there, at the states in the
     work space.
     """
-    automata, tapes, inputs, lin, ints, known = (
-        model.automata,
-        model.tapes,
-        model.inputs,
-        model.lin,
-        loop.int_slots,
-        loop.known,
-    )
+    automata, tapes, inputs = model.automata, model.tapes, model.inputs
+    lin, ints, known = model.lin, loop.int_slots, loop.known
     j, hi, lo, z, p = ints[KNOWN], loop.times[0], loop.times[1], state.z, work.p_after
     if needs_choice(automata, z, known.resets[known.kinds[j], 0] != NO_RESET):
         return 0

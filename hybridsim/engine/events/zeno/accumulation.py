@@ -250,11 +250,8 @@ class Accumulation:
         """Return whether the events of a component may have reached their limit, and its updated intervals."""
         pace = self.paces.get(component, BEGINNING)
         known = np.array(pace.intervals) if pace.intervals else _NO_INTERVALS
-        at, work, last = (
-            np.array(pace.last or (0.0, 0.0)),
-            np.empty((2, MAX_EVENTS_PER_TURN)),
-            np.empty(_STORED_INTERVALS),
-        )
+        at = np.array(pace.last or (0.0, 0.0))
+        work, last = np.empty((2, MAX_EVENTS_PER_TURN)), np.empty(_STORED_INTERVALS)
         ended, count = may_end(
             known, at, pace.last is not None, instants, owners, component, self.shortest, self.resolution, work, last
         )  # fmt: skip
