@@ -16,16 +16,7 @@ from hybridsim.engine.native.kernels import call_kernel, inline_always, inlined,
 from hybridsim.engine.native.loop_hints import fill, put
 from hybridsim.ensemble.newton import FAILED, FOLLOWED, MULTIPLE, NEARLY, NEXT, OUTCOME, SEGMENTS_DONE
 from hybridsim.ensemble.period_map import begin_segment, run_periods
-from hybridsim.ensemble.points import (
-    BEGIN,
-    MOVES,
-    NEWTON,
-    RESTS,
-    SEARCH,
-    SUMMARISE,
-    UNDECIDED,
-    store_summary,
-)
+from hybridsim.ensemble.points import BEGIN, MOVES, NEWTON, RESTS, SEARCH, SUMMARISE, UNDECIDED, store_summary
 from hybridsim.ensemble.returns import (
     measure_scale,
     nearest_return,

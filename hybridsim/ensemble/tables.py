@@ -7,10 +7,7 @@ from typing import Any
 import numpy as np
 
 from hybridsim.engine.linear.matrix_template import template_of
-from hybridsim.engine.linear.tables import (
-    LinearTables,
-    of_matrices,
-)
+from hybridsim.engine.linear.tables import LinearTables, of_matrices
 from hybridsim.engine.linear.units import horizon_class
 from hybridsim.engine.native.struct_pack import packed
 from hybridsim.engine.run.method_kernels import NOT_LINEAR

@@ -56,8 +56,7 @@ def choose(system: System, x0: np.ndarray, z0: np.ndarray, span: tuple[float, fl
         return Choice("rodas5p", f"for stability an explicit method would need {steps:.0e} steps")
     if system.has_corners:
         return Choice(
-            "dop853",
-            "its modes are not stiff at the start; jumps inside modes are not treated as events",
+            "dop853", "its modes are not stiff at the start; jumps inside modes are not treated as events"
         )
     if rtol < _TIGHT:
         return Choice("taylor", f"its modes are smooth and the tolerance is tight{rest}")

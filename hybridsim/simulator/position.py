@@ -162,10 +162,7 @@ def _task(position: Position, to: float) -> Task:
 
 
 def _follow(
-    position: Position,
-    task: Task,
-    go: Callable[[Task], Trajectory],
-    commit: Callable[[Position], None],
+    position: Position, task: Task, go: Callable[[Task], Trajectory], commit: Callable[[Position], None]
 ) -> None:
     """Carry out a task, and pass `commit` the position at its end, or at the last event before an error."""
     record = task.record

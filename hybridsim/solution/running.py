@@ -21,10 +21,7 @@ from hybridsim.solution.solution import Solution
 
 
 def carried_out(
-    run: Run,
-    progress: Callable[[float], None] | None,
-    compile_time: float = 0.0,
-    before: float = 0.0,
+    run: Run, progress: Callable[[float], None] | None, compile_time: float = 0.0, before: float = 0.0
 ) -> Solution:
     """Carry out the run and return its solution; `compile_time` and `before` are seconds spent earlier."""
     began, compiled = time.perf_counter(), seconds_compiling()

@@ -27,10 +27,7 @@ def in_html(run: RunTrajectory, success: bool) -> str:
     if not isinstance(run, ModelTrajectory):
         return f"<pre>{escape(as_text(run))}</pre>"
     model = run.model
-    head = {
-        run.status: f"{model.title or model.name}, by {run.integrator}",
-        "cost": cost_text(run.stats),
-    }
+    head = {run.status: f"{model.title or model.name}, by {run.integrator}", "cost": cost_text(run.stats)}
     head |= {} if success else {"message": run.message}
     span = (run.t_start, run.t_end) if run.segments else None
     known = run.save != "nothing"

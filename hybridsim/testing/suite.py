@@ -16,13 +16,7 @@ from hybridsim.integrators.contract import Integrator
 from hybridsim.integrators.registry import registered
 from hybridsim.testing.catalogue import SCENES
 from hybridsim.testing.scene import Scene
-from hybridsim.testing.study import (
-    allowed_errors,
-    carry_out,
-    integrator,
-    lacking,
-    settings_for,
-)
+from hybridsim.testing.study import allowed_errors, carry_out, integrator, lacking, settings_for
 from hybridsim.testing.verdict import LACKS, RIGHT, WRONG_ANSWER, verdict
 
 

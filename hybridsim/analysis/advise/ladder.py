@@ -166,17 +166,7 @@ def _step(
     error = relative_error(answer.value, full.value)
     verdict = ADEQUATE if error <= tol else NOT_ADEQUATE
     why = _why(error, tol, full.value)
-    return Step(
-        rung.name,
-        rung.title,
-        rung.drops,
-        answer.value,
-        error,
-        answer.seconds,
-        verdict,
-        why,
-        model,
-    )
+    return Step(rung.name, rung.title, rung.drops, answer.value, error, answer.seconds, verdict, why, model)
 
 
 def _formula(rung: LadderStep, scene: Scene, question: Question, _: Watch | None = None) -> Answer:

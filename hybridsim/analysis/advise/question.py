@@ -26,14 +26,7 @@ OF_RUN = ("final", "event_time")
 OF_MOTION = ("period",)
 HEADS = (*OF_QUANTITY, *OF_CONTACT, *OF_MOTION, *OF_RUN)
 # quantities that rounding can make non-zero
-_SIGNED = (
-    "amplitude",
-    "maximum",
-    "minimum",
-    "mean",
-    "harmonic",
-    "final",
-)
+_SIGNED = ("amplitude", "maximum", "minimum", "mean", "harmonic", "final")
 _NEUTRAL = 1e-6  # 1 minus a multiplier of a disturbance; a smaller decay per period counts as none
 _STICK = "stick"  # the mode of every contact in which nothing slides
 
@@ -272,8 +265,7 @@ def question_of(model: Model, quantity: Any, t_span: tuple[float, float] | None,
     if head in OF_MOTION:
         if t_span is not None or rest:
             raise UsageError(
-                f"`quantity` cannot be {quantity!r}",
-                remedy="write 'period' alone, and remove `t_span`",
+                f"`quantity` cannot be {quantity!r}", remedy="write 'period' alone, and remove `t_span`"
             )
         return Question(quantity, None, None, accuracy)
     names = _names(model, head)

@@ -31,11 +31,7 @@ from hybridsim.errors import SimulationError
 from hybridsim.model import Model
 
 # Rungs as slow as the full model; they are tried only if nothing simpler is adequate.
-_DEAR = (
-    "tanh",
-    "arctan",
-    "karnopp",
-)
+_DEAR = ("tanh", "arctan", "karnopp")
 
 
 @dataclass(frozen=True)
@@ -120,16 +116,7 @@ def _steps(found: Sweep, ladder_steps: Sequence[LadderStep], tol: float) -> list
         if stopped_at := int(found["stopped"][done][:, k].sum()):
             why += f"; stopped at {stopped_at}, because it was slower than the full model"
         steps.append(
-            Step(
-                rung.name,
-                rung.title,
-                rung.drops,
-                None,
-                float(known.max()),
-                math.nan,
-                verdict,
-                why,
-            )
+            Step(rung.name, rung.title, rung.drops, None, float(known.max()), math.nan, verdict, why)
         )
     alone = int((simplest == FULL).sum())
     steps.append(

@@ -111,12 +111,7 @@ class _Settling:
 
 
 def settings(
-    model: Model,
-    question: Question,
-    full: Answer,
-    tol: float,
-    limits: Limits,
-    report: Callable[[str], None],
+    model: Model, question: Question, full: Answer, tol: float, limits: Limits, report: Callable[[str], None]
 ) -> tuple[Setting, ...]:
     """Try the settings of each integrator from the loosest to an adequate one, and return them sorted by `rank`."""
     found = []

@@ -42,8 +42,7 @@ class Series:
     def __post_init__(self) -> None:
         if not self.values:
             raise UsageError(
-                f"no values of {self.varied} are given for {self.integrator}",
-                remedy="use at least one value",
+                f"no values of {self.varied} are given for {self.integrator}", remedy="use at least one value"
             )
         if (self.varied == "v0") != bool(self.regularized):
             raise UsageError(

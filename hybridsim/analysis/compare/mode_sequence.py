@@ -137,10 +137,7 @@ def _align(expected: Sequence[_Entry], found: Sequence[_Entry], window: float) -
     lows, highs = np.searchsorted(b, a - window), np.searchsorted(b, a + window, side="right")
     choices: list[NDArray[np.int8]] = []
     # Cost of aligning the entries so far with the first `low`, low + 1, ... found entries.
-    low, cost = (
-        0,
-        np.zeros(1),
-    )
+    low, cost = (0, np.zeros(1))
     for i, (next_low, high) in enumerate(zip(lows, highs, strict=True)):
         count = np.arange(next_low, high + 1)
         beyond = np.maximum(count - (low + len(cost) - 1), 0)

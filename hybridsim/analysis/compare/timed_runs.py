@@ -142,11 +142,7 @@ def _not_fitting(predicted: dict[_Run, float], seconds: float) -> list[_Run]:
 
 
 def _time(
-    entries: Sequence[Entry],
-    rows: dict[_Run, Row],
-    repeat: int,
-    budget: Budget,
-    step: Callable[[str], None],
+    entries: Sequence[Entry], rows: dict[_Run, Row], repeat: int, budget: Budget, step: Callable[[str], None]
 ) -> None:
     timed = [run for run, row in rows.items() if row.cost is not None]
     calls, expected = [], []

@@ -137,10 +137,7 @@ def _save_setting(args: argparse.Namespace) -> str | float:
                     remedy="use --keep all, --keep last-period or --keep TIME",
                 )
     if args.keep != "all" and args.explain:
-        raise UsageError(
-            f"--explain needs the whole run, but --keep is {args.keep}",
-            remedy="remove --keep",
-        )
+        raise UsageError(f"--explain needs the whole run, but --keep is {args.keep}", remedy="remove --keep")
     if args.keep in ("all", "events", "last-period", "nothing"):
         return str(args.keep)
     try:

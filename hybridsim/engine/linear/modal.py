@@ -141,11 +141,7 @@ def _layout(count: int, size: int, widest: int) -> ArrayLayout:
 
 
 def _by_blocks(
-    balanced: np.ndarray,
-    values: np.ndarray,
-    vectors: np.ndarray,
-    scale: np.ndarray,
-    are_right: bool,
+    balanced: np.ndarray, values: np.ndarray, vectors: np.ndarray, scale: np.ndarray, are_right: bool
 ) -> Modal:
     """Merge eigenvalues into common blocks until the basis is well conditioned."""
     if not are_right:

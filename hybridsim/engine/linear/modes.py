@@ -9,14 +9,7 @@ from itertools import product
 
 import numpy as np
 
-from hybridsim.engine.linear.form import (
-    MOST_PRODUCTS,
-    Atoms,
-    DividesByZero,
-    LinearReader,
-    NotLinear,
-    Read,
-)
+from hybridsim.engine.linear.form import MOST_PRODUCTS, Atoms, DividesByZero, LinearReader, NotLinear, Read
 from hybridsim.engine.linear.terms import Form, Monomial, Product
 from hybridsim.engine.series.optimise import PAIRED, arguments_of
 from hybridsim.engine.system.per_structure import per_structure

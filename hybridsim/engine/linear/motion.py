@@ -16,13 +16,7 @@ from hybridsim.engine.native.constants import BOUND_TERMS
 from hybridsim.engine.native.kernels import allocating_kernel, call_noinline, inlined, kernel
 from hybridsim.engine.native.loop_hints import index, short_loop
 from hybridsim.engine.native.simd.products import product, times
-from hybridsim.engine.roots.certify import (
-    falls_over,
-    past_dip,
-    safe_step,
-    stays_positive,
-    zero_of_terms,
-)
+from hybridsim.engine.roots.certify import falls_over, past_dip, safe_step, stays_positive, zero_of_terms
 from hybridsim.engine.roots.first_exit import FOUND, NEVER, OPEN
 from hybridsim.engine.series.bounded import UNIT
 

@@ -6,11 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from hybridsim.engine.record.hermite import (
-    fit_all,
-    right_system,
-    shift_matrix,
-)
+from hybridsim.engine.record.hermite import fit_all, right_system, shift_matrix
 from hybridsim.engine.record.series_block import SeriesBlock
 
 TERMS = 4  # coefficients of the flow at each end of a step: the dense output has degree 7

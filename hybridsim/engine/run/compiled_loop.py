@@ -29,12 +29,7 @@ from hybridsim.engine.record.blocks import SegmentBlock
 from hybridsim.engine.record.checkpoint import damaged
 from hybridsim.engine.record.counters import Counters
 from hybridsim.engine.record.trajectory import Trajectory
-from hybridsim.engine.run.event_loop import (
-    MIN_STEPS_IN_PART,
-    LoopRecord,
-    call_event_loop,
-    link_event_loop,
-)
+from hybridsim.engine.run.event_loop import MIN_STEPS_IN_PART, LoopRecord, call_event_loop, link_event_loop
 from hybridsim.engine.run.kernel_run import (
     ARRIVED,
     BEFORE_SOMETHING,

@@ -25,13 +25,7 @@ from hybridsim.engine.run.appointment_events import events_before_appointment
 from hybridsim.engine.run.compiled_loop import CompiledLoop
 from hybridsim.engine.run.headway import Headway, NoHeadway, TakenOver
 from hybridsim.engine.run.kernel_run import ARRIVED, PAUSED
-from hybridsim.engine.run.located import (
-    Located,
-    errors_when_due,
-    located,
-    located_backward,
-    without_fatal,
-)
+from hybridsim.engine.run.located import Located, errors_when_due, located, located_backward, without_fatal
 from hybridsim.engine.run.notices import Notices
 from hybridsim.engine.run.recording import Recorder, passed_events
 from hybridsim.engine.run.segment_run import Arrival, SegmentRun

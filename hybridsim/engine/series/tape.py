@@ -211,12 +211,7 @@ class TapeBuilder:
         import sympy as sp
 
         one = self._constant(1.0)
-        simple: Mapping[Any, int] = {
-            sp.Abs: ops.ABS,
-            sp.sign: ops.SIGN,
-            sp.Not: ops.NOT,
-            sp.tan: ops.TANGENT,
-        }
+        simple: Mapping[Any, int] = {sp.Abs: ops.ABS, sp.sign: ops.SIGN, sp.Not: ops.NOT, sp.tan: ops.TANGENT}
         chained: Mapping[Any, int] = {sp.Min: ops.MIN, sp.Max: ops.MAX, sp.And: ops.AND, sp.Or: ops.OR}
         ordered: Mapping[Any, tuple[int, bool]] = {
             sp.StrictLessThan: (ops.LESS, False),

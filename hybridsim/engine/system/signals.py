@@ -17,10 +17,7 @@ from hybridsim.model.parts.inputs import Input
 
 _TWO_PI = 2.0 * math.pi
 # knots of a wave as fractions of its period, with (value, slope per period) just after each knot
-_SHAPES = {
-    "triangle": ((-0.25, -1.0, 4.0), (0.25, 1.0, -4.0)),
-    "sawtooth": ((0.0, -1.0, 2.0),),
-}
+_SHAPES = {"triangle": ((-0.25, -1.0, 4.0), (0.25, 1.0, -4.0)), "sawtooth": ((0.0, -1.0, 2.0),)}
 
 
 class Signal:

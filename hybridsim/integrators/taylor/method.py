@@ -38,12 +38,7 @@ class TaylorStepper:
     """Advances Taylor's method through one segment."""
 
     def __init__(
-        self,
-        flow: Flow,
-        x0: np.ndarray,
-        bound: float,
-        tolerances: Tolerances,
-        first_step: float | None,
+        self, flow: Flow, x0: np.ndarray, bound: float, tolerances: Tolerances, first_step: float | None
     ) -> None:
         self.flow, self.bound, self.tolerances = flow, bound, tolerances
         self.series = SeriesRun(flow.system, flow.p, flow.z, tolerances)

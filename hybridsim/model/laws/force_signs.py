@@ -13,13 +13,7 @@ from hybridsim.model.parts.model import Model
 from hybridsim.model.smoothing.one_sided import number_of, reached_names
 
 # test speeds relative to the nominal velocity; a warning requires a wrong sign at all of them
-_SPEEDS = (
-    1e-3,
-    1e-2,
-    0.1,
-    1.0,
-    10.0,
-)
+_SPEEDS = (1e-3, 1e-2, 0.1, 1.0, 10.0)
 _FRICTION = "a friction force must not be negative: correct the sign"
 
 

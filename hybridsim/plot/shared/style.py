@@ -117,12 +117,7 @@ def legend_below(whole: Figure, handles: Sequence[Artist]) -> float:
     longest = max(map(_letters, handles), default=1) + _LONG_HANDLE
     columns = max(1, min(len(handles), int(whole.get_figwidth() * _LETTERS / longest)))
     whole.legend(
-        handles=handles,
-        loc="outside lower center",
-        ncols=columns,
-        frameon=False,
-        fontsize=9,
-        handlelength=3,
+        handles=handles, loc="outside lower center", ncols=columns, frameon=False, fontsize=9, handlelength=3
     )
     return _ROW * math.ceil(len(handles) / columns) / 72
 

@@ -73,10 +73,7 @@ def _free(r: float, zeta: float) -> tuple[tuple[float, float], float]:
     equations = np.array(
         [
             [1.0 + decay * c, decay * s],
-            [
-                -zeta - decay * (zeta * c + kappa * s),
-                kappa + decay * (kappa * c - zeta * s),
-            ],
+            [-zeta - decay * (zeta * c + kappa * s), kappa + decay * (kappa * c - zeta * s)],
         ]
     )
     a, b = np.linalg.solve(equations, [-2.0, 0.0])

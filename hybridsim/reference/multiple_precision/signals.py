@@ -12,10 +12,7 @@ from hybridsim.model.parts.inputs import Input
 from hybridsim.reference.multiple_precision.precision import Number, Precision
 
 # (knot as a fraction of the period, value there, slope per period) of the piecewise linear waves
-_CORNERS = {
-    "triangle": ((-0.25, -1, 4), (0.25, 1, -4)),
-    "sawtooth": ((0, -1, 2),),
-}
+_CORNERS = {"triangle": ((-0.25, -1, 4), (0.25, 1, -4)), "sawtooth": ((0, -1, 2),)}
 
 
 class Signal:

@@ -70,10 +70,7 @@ def _stored(solution: Solution) -> dict[str, np.ndarray]:
 
     run, trajectory = solution._run, solution._of_model.record
     task, counters = run.task, trajectory.counters
-    arrays: dict[str, np.ndarray] = {
-        **fields_of(task, "x0", "z0", "discrete"),
-        "atol": task.tolerances.atol,
-    }
+    arrays: dict[str, np.ndarray] = {**fields_of(task, "x0", "z0", "discrete"), "atol": task.tolerances.atol}
     if run.grid is not None:
         arrays["grid"] = run.grid
     kinds: list[str] = []

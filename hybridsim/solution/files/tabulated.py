@@ -73,10 +73,5 @@ def tabulated(
         columns,
         {a.name: (a.modes, row) for a, row in zip(declared, numbers, strict=True)},
         {name: unit for name, unit in ({"t": time_unit(model)} | units_of(model)).items() if unit},
-        {
-            "model": model.name,
-            "title": model.title,
-            "integrator": run.method.name,
-            "status": status,
-        },
+        {"model": model.name, "title": model.title, "integrator": run.method.name, "status": status},
     )

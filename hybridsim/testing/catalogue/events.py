@@ -33,12 +33,7 @@ def grazing() -> tuple[Scene, ...]:
             needs("transitions", "multiple-roots"),
             params={"gap": -gap},
             # the level is met at a slope of 1.4e-3
-            **{
-                **common,
-                "tol_t": 1e-6,
-                "floor": 1e-7,
-                "effort": 20_000,
-            },
+            **{**common, "tol_t": 1e-6, "floor": 1e-7, "effort": 20_000},
         ),
     )
 
@@ -142,11 +137,7 @@ def monitored() -> tuple[Scene, ...]:
             needs("monitors", "multiple-roots"),
             unit=10.0,
             # the dip is 1e-6 deep: at 1e-6 a method of low order is off by more
-            tolerances=(
-                1e-8,
-                1e-10,
-                1e-12,
-            ),
+            tolerances=(1e-8, 1e-10, 1e-12),
             **exact,
         ),
         Scene(

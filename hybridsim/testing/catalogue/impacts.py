@@ -73,12 +73,7 @@ def _bounce() -> Scene:
     """Return the test case of a ball that bounces from t = 0.5 on, and comes to rest at t = 1.5."""
     states = (*((t, _height(t)) for t in (0.3, 0.8, 1.1, 1.3)), (END, (0.0, 0.0)))
     checks = (("", closes("p")), ("located", rests("p")), ("", equals(2.0, h=0.0, w=0.0)))
-    return named(
-        "bounce",
-        (0.0, 2.0),
-        Truth(None, states, checks=checks),
-        **_BOUNCES,
-    )
+    return named("bounce", (0.0, 2.0), Truth(None, states, checks=checks), **_BOUNCES)
 
 
 def _bar() -> Scene:
@@ -90,13 +85,7 @@ def _bar() -> Scene:
         ("located", rests("p", "q")),
         ("", equals(2.0, a=0.0, b=0.0, va=0.0, vb=0.0)),
     )
-    return Scene(
-        "bar-on-two-supports",
-        "bar",
-        (0.0, 2.0),
-        Truth(None, states, checks=checks),
-        **_BOUNCES,
-    )
+    return Scene("bar-on-two-supports", "bar", (0.0, 2.0), Truth(None, states, checks=checks), **_BOUNCES)
 
 
 def _table() -> Scene:

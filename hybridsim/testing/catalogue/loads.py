@@ -79,10 +79,7 @@ def _ending() -> Scene:
     return named(
         "load-that-ends",
         (0.0, 3.0),
-        Truth(
-            ((2.0, "g:slip+"),),
-            ((END, (50.0 * 3 - 20 * (0.5 * 3 - 1 / 6), 40.0, 1 / 6, 0.5)),),
-        ),
+        Truth(((2.0, "g:slip+"),), ((END, (50.0 * 3 - 20 * (0.5 * 3 - 1 / 6), 40.0, 1 / 6, 0.5)),)),
         needs("contacts", "scheduled", "exact-stick"),
         start_is_event=False,
         speed=50.0,

@@ -33,10 +33,7 @@ def _guards() -> Scene:
         (4.5, "moved:after"),
         (5.5, "set:after"),
     )
-    states = (
-        (0.75, (0.25, -2.25, -1.75, 1.15, 0.75, -5.0)),
-        (6.0, (-5.0, 3.0, -7.0, -0.1, 6.0, 5.0)),
-    )
+    states = ((0.75, (0.25, -2.25, -1.75, 1.15, 0.75, -5.0)), (6.0, (-5.0, 3.0, -7.0, -0.1, 6.0, 5.0)))
     return named("sides-of-guards", (0.0, 6.0), Truth(events, states), needs("transitions", "scheduled"))
 
 

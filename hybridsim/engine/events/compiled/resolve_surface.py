@@ -61,15 +61,7 @@ def take_fine_row(automata: Any, lin: Any, k: int, z: Any, continuous: bool, sta
 
 @inline_always
 def choose_modes(
-    automata: Any,
-    tapes: Any,
-    inputs: Any,
-    lin: Any,
-    at: Any,
-    k: int,
-    is_known: bool,
-    count: int,
-    work: Any,
+    automata: Any, tapes: Any, inputs: Any, lin: Any, at: Any, k: int, is_known: bool, count: int, work: Any
 ) -> int:
     """Choose the modes of the first `count` components of a cluster, and write them to `trial`.
 

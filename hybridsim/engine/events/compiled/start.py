@@ -41,14 +41,7 @@ _UNKNOWN = -1  # mode not determined yet
 
 @kernel
 def plain_start(
-    automata: Any,
-    tapes: Any,
-    inputs: Any,
-    none: Any,
-    pin_at: int,
-    surfaces: Any,
-    state: Any,
-    work: Any,
+    automata: Any, tapes: Any, inputs: Any, none: Any, pin_at: int, surfaces: Any, state: Any, work: Any
 ) -> bool:
     """Choose all modes from the states, error bounds and run-time vector in `state`; return False if uncertain.
 

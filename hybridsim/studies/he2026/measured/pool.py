@@ -46,11 +46,7 @@ class Pool:
             self._progress(done, self._part)
 
     def map(
-        self,
-        function: Callable[[Item], Result],
-        items: Iterable[Item],
-        begin: float = 0.0,
-        end: float = 1.0,
+        self, function: Callable[[Item], Result], items: Iterable[Item], begin: float = 0.0, end: float = 1.0
     ) -> list[Result]:
         """Return function(item) for every item in order, and report progress from `begin` to `end`.
 

@@ -24,10 +24,7 @@ _USUAL = (15.0, 170.0)
 METHODS: tuple[paper.Variant, ...] = (*paper.SIGNS, paper.LITERAL, paper.ZEROED)
 EXACT, STRIBECK = "exact", "Stribeck law"
 # rest holds up to F0/N = 0.6 there; the decay is to 3e-6
-STRIBECK_RATIOS, _STRIBECK_PERIODS = (
-    (0.8, 1.2),
-    60,
-)
+STRIBECK_RATIOS, _STRIBECK_PERIODS = ((0.8, 1.2), 60)
 _CONSTANT = 0.01  # relative variation that looks constant in a picture
 _ROUNDING = 1e-10  # rounding over a few hundred periods
 # Steady motions over the whole plane for the test to rounding: a lattice that repeats no value.
