@@ -8,7 +8,9 @@ import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from numbers import Integral, Real
-from typing import SupportsFloat
+from typing import Any, SupportsFloat
+
+import numpy as np
 
 from hybridsim.errors import ExpressionError, Place, nearest
 from hybridsim.expr.check import check_size, check_tree
@@ -243,12 +245,19 @@ def check_text(text: str, where: Place, also: str = "") -> None:
             )
 
 
-def _as_text(quantity: object, where: Place) -> str:
+def is_zero_dimensional(value: object) -> bool:
+    """Return whether a value is a NumPy array without dimensions, which contains one number."""
+    return isinstance(value, np.ndarray) and value.ndim == 0
+
+
+def _as_text(quantity: Any, where: Place) -> str:
     """Return the text of a number or string, and reject other objects."""
     if isinstance(quantity, str):
         return quantity
     if isinstance(quantity, bool):
         return str(quantity)
+    if is_zero_dimensional(quantity):
+        return _as_text(quantity.item(), where)
     if isinstance(quantity, Integral):
         value = int(quantity)
         return str(value) if abs(value) <= MAX_INTEGER else repr(_double(value, where))

@@ -222,6 +222,14 @@ class Solution(InPictures):
         return self._measured("nfev", self.stats.get("rhs_evaluations"), "a Model")
 
     @property
+    def njev(self) -> int:
+        """No result: SciPy counts Jacobians under this name, and hybridsim does not."""
+        raise AttributeError(
+            f"a Solution has no njev, because Jacobians are not counted; `stats` has {', '.join(self.stats)}",
+            name="njev",
+        )
+
+    @property
     def t_events(self) -> list[np.ndarray]:
         """Times of each monitor in the order of declaration, with the name that SciPy uses."""
         return [self.event_times(name, "monitor") for name in self._monitors]

@@ -94,7 +94,7 @@ def test_numbers_of_all_kinds_are_numbers() -> None:
         x0=(Fraction(0), np.int64(0)),
         max_step=np.array(0.001),
         first_step=np.float32(2.0**-20),
-        params={"N": np.float64(40)},
+        params={"N": np.float64(40), "mu": np.array(0.5)},
     )
     assert (plain.y == other.y).all()
 

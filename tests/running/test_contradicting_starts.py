@@ -67,3 +67,21 @@ def test_a_gap() -> None:
         "p begins in mode closed" in text
         for text in hs.simulate(ball, (0.0, 0.1), z0={"p": "closed"}).warnings
     )
+
+
+@pytest.mark.parametrize("integrator", ["exact", "taylor", "dop853", "scipy-rk45", "rodas5p", "cvode-bdf"])
+@pytest.mark.parametrize("speed", [-4.43, 4.43, 0.0])
+def test_a_gap_just_below_zero(speed: float, integrator: str) -> None:
+    """A state of an earlier run at an impact has the rounding of that run, so that its gap may be below zero."""
+    ball = hs.Model(
+        "ball",
+        states=[hs.State("h", -1.7e-17, "v"), hs.State("v", speed, "-9.81 + p")],
+        impacts=[hs.Impact("p", gap="h", restitution=0.5)],
+    )
+    sol = hs.simulate(ball, (0.0, 0.2), integrator=integrator)
+    thrown = speed if speed > 0.0 else -0.5 * speed
+    expected = thrown * 0.2 - 0.5 * 9.81 * 0.2**2 if thrown else 0.0
+    assert sol.success and sol.x_end[0] == pytest.approx(expected, abs=1e-9)
+    assert (sol.events[0].t if speed < 0.0 else 0.0) == 0.0
+    below = hs.simulate(ball, (0.0, 0.2), x0={"h": -2e-12, "v": speed}, integrator=integrator)
+    assert below.status == "inconsistent" and "gap of p is -2e-12, below zero" in below.message

@@ -168,6 +168,8 @@ def test_names_of_scipy() -> None:
     )
     sol = hs.simulate(model, (0, 100), rtol=1e-12)
     assert sol.success and sol.nfev > 0
+    with pytest.raises(AttributeError, match="no njev, because Jacobians are not counted; `stats` has steps"):
+        _ = sol.njev
     apex, ground = sol.t_events
     assert apex == pytest.approx([10 / 9.81], abs=1e-11)
     assert ground == pytest.approx([20 / 9.81], abs=1e-11)

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from hybridsim.analysis.compare.errors_against_reference import Errors
 from hybridsim.analysis.compare.regularised import exponent_text, exponents
@@ -27,6 +27,10 @@ from hybridsim.arguments import cannot_be, known_name
 from hybridsim.errors import printable
 from hybridsim.files import csv_records, json_record
 from hybridsim.presentation.readable import Readable
+from hybridsim.presentation.tables import library
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 _NAMES = dict(zip(QUANTITIES, ("state", "last period", "event time", "graph")))
 
@@ -152,6 +156,10 @@ class Comparison(Readable):
     def to_csv(self, path: str | Path) -> None:
         """Write one line per row; times are in the model's unit, wall times in seconds."""
         csv_records(path, self.records())
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Return a data frame with one row per run and the columns of `to_csv`."""
+        return library("pandas").DataFrame(self.records())
 
     def to_dict(self) -> dict[str, Any]:
         """Return all results as plain Python values."""

@@ -17,6 +17,7 @@ from hybridsim.errors import UsageError, nearest
 from hybridsim.expr import evaluate
 from hybridsim.expr.grammar import TIME
 from hybridsim.solution import Solution
+from hybridsim.solution.integrals.impulsive import impulse_of, is_struck
 
 MOST_HARMONICS = 100_000  # a segment cannot resolve a higher one
 _ROUNDING = 1e-10  # relative to a guard's largest value; a smaller value is rounding after an event
@@ -257,6 +258,21 @@ class Measures:
         )
         count = sum(mode == hold for mode in intervals)
         return float(count - (intervals[0] == hold == intervals[-1]))
+
+    @property
+    def impacts(self) -> ByName:
+        """Number of collisions of each impact over the period; see `hybridsim.Impact`."""
+        events = self.solution.events
+        return self._of_impacts(lambda p: float(sum(e.component == p and is_struck(e) for e in events)))
+
+    @property
+    def impulse(self) -> ByName:
+        """Sum of the impulses of each impact over the period, in the unit of its force times that of t."""
+        return self._of_impacts(lambda p: impulse_of(self.solution, p))
+
+    def _of_impacts(self, measure: Callable[[str], float]) -> ByName:
+        names = tuple(impact.name for impact in self.solution.model.impacts)
+        return ByName(lambda: (names, frozenset()), measure, "impact")
 
     @cached_property
     def word(self) -> tuple[str, ...]:

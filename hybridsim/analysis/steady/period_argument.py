@@ -41,7 +41,8 @@ def refuse_what_ends(system: System) -> None:
     if system.is_unilateral.any():
         raise UsageError(
             f"model {model.name} has impacts, for which steady states are not supported",
-            remedy="write impacts as a guard and a reset, or use hs.simulate until the motion repeats",
+            remedy="measure one period late in a run, hs.sweep(..., 'maximum.x', after=100), whose reading 'residual' "
+            "is the distance from repeating; or write the impact as a guard with a reset",
         )
     for declared in model.inputs:
         if declared.period is None:

@@ -30,7 +30,7 @@ class SweptSystem:
     """A mechanical system with the attributes of a `Model` that a sweep reads."""
 
     system: MechanicalSystem
-    discrete = inputs = ()
+    discrete = inputs = impacts = ()
     flow = True  # as a model of Python functions, it has no text
 
     @property

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from hybridsim.analysis.compare.comparison import Comparison, differences
 from hybridsim.analysis.compare.comparison_request import positives
@@ -17,6 +17,10 @@ from hybridsim.analysis.suite.verdict import COMMON, USELESS, Verdict, verdict
 from hybridsim.errors import printable
 from hybridsim.files import csv_records, json_record
 from hybridsim.presentation.readable import Readable, aligned
+from hybridsim.presentation.tables import library
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 ACCURACIES = (1e-3, 1e-6, 1e-9, 1e-11)
 
@@ -144,8 +148,16 @@ class SuiteComparison(Readable):
 
     def to_csv(self, path: str | Path) -> None:
         """Write one line per run of any test case; times are in the model's unit, wall times in seconds."""
+        csv_records(path, self.records())
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Return a data frame with one row per run of any test case and the columns of `to_csv`."""
+        return library("pandas").DataFrame(self.records())
+
+    def records(self) -> list[dict[str, Any]]:
+        """Return the runs of all test cases as plain Python values."""
         rows = ((result.scene.name, row) for result in self.results for row in result.comparison.records())
-        csv_records(path, [{"scene": scene, **row} for scene, row in rows])
+        return [{"scene": scene, **row} for scene, row in rows]
 
     def to_dict(self) -> dict[str, Any]:
         """Return all results as plain Python values."""

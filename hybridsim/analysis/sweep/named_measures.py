@@ -27,6 +27,7 @@ from hybridsim.analysis.sweep.last_period import OF_MOTION, LastPeriod, Measured
 from hybridsim.analysis.sweep.run_readings import (
     FINAL,
     FIRST_PASSAGE,
+    OF_IMPACT,
     OF_MODE,
     OF_QUANTITY,
     OfRun,
@@ -189,6 +190,8 @@ def units_of_readings(reading_names: Iterable[str], model: Model) -> dict[str, s
             unit = known.get(rest.rpartition(".")[0] if head == "harmonic" else rest, "")
             squared = f"({unit})² {time}" if " " in unit or "/" in unit else f"{unit}² {time}"
             units[word] = (squared.strip() if head == _SQUARED else unit) if unit else ""
+        elif head == "impulse" and known.get(rest):
+            units[word] = f"{known[rest]} {time}".strip()
         elif head == "dissipated":
             units[word] = next((unit_of_work(model, c) for c in model.contacts if c.name == rest), "")
     return {word: unit for word, unit in units.items() if unit}
@@ -202,8 +205,9 @@ def _known(model: Model, of_motion: Sequence[str]) -> list[str]:
     contacts = [contact.name for contact in model.contacts]
     numbered = {"harmonic": ".1"}
     found = [f"{head}.{name}{numbered.get(head, '')}" for head in _OF_QUANTITY for name in quantities]
-    of_modes = [f"{OF_MODE}.{name}" for name in modes_of(model)]
-    return [*found, *(f"{head}.{name}" for head in _OF_CONTACT for name in contacts), *of_modes, *of_motion]
+    found += [f"{head}.{name}" for head in _OF_CONTACT for name in contacts]
+    found += [f"{head}.{impact.name}" for head in OF_IMPACT for impact in model.impacts]
+    return [*found, *(f"{OF_MODE}.{name}" for name in modes_of(model)), *of_motion]
 
 
 def _steady_reader(word: str, system: System) -> Reader | None:

@@ -20,6 +20,7 @@ from hybridsim.arguments import known_name
 from hybridsim.errors import printable
 from hybridsim.files import json_record, whole_file
 from hybridsim.model import Model
+from hybridsim.model.free_name import free_name
 from hybridsim.presentation.readable import Readable, aligned
 from hybridsim.presentation.tables import library
 
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 _SHOWN = 5  # number of statuses that are shown
+_STATUS = "status"  # the title of the statuses in tables
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,19 +118,23 @@ class Sweep(Readable):
         return printable("\n".join([*head, "", *lines] if rows else head))
 
     def columns(self) -> dict[str, np.ndarray]:
-        """Return axes, results and status as columns, one row per point; arrays become ``name[0]``, ..."""
+        """Return axes, results and status as columns, one row per point; arrays become ``name[0]``, ...
+
+        A result with the name of another column gets an underscore: a result "status" is the column "status_".
+        """
         if self.mode == "grid":
             grids = np.meshgrid(*self.axes.values(), indexing="ij")
             found = {name: grid.ravel() for name, grid in zip(self.axes, grids, strict=True)}
         else:
             found = dict(self.axes)
+        status = free_name(found, _STATUS)
+        titles = _Titles([*found, status])
         for name, values in self.values.items():
-            if values.ndim == self.status.ndim:
-                found[name] = values.ravel()
-            else:
-                rows = values.reshape(self.status.size, -1)
-                found |= {f"{name}[{k}]": rows[:, k] for k in range(rows.shape[1])}
-        return found | {"status": self.status.ravel()}
+            rows = values.reshape(self.status.size, -1)
+            for k in range(rows.shape[1]):
+                title = name if values.ndim == self.status.ndim else f"{name}[{k}]"
+                found[titles.unused(title)] = rows[:, k]
+        return found | {status: self.status.ravel()}
 
     def to_csv(self, path: str | Path) -> None:
         """Write one line per point, with numbers in full precision."""
@@ -176,17 +182,18 @@ class Sweep(Readable):
         """Return an xarray data set over the axes, with the results, their units and the status."""
         xarray = library("xarray")
         where = self.dimensions
+        status = free_name([*self.axes, *where], _STATUS)
+        titles = _Titles([*self.axes, *where, status])
         variables = {
-            name: (self._dimensions_of(name), v, self._unit(name)) for name, v in self.values.items()
+            titles.unused(name): (self._dimensions_of(name), v, self._unit(name))
+            for name, v in self.values.items()
         }
         coordinates = {
             name: (name if self.mode == "grid" else POINT, values, self._unit(name))
             for name, values in self.axes.items()
         }
         about = {"model": self.model.name, "title": self.model.title, "measure": self.measure}
-        return xarray.Dataset(
-            variables | {"status": (where, self.status.astype(np.str_))}, coordinates, about
-        )
+        return xarray.Dataset(variables | {status: (where, self.status.astype(np.str_))}, coordinates, about)
 
     def plot(self, *names: str, over: str | None = None) -> Any:
         """Draw results as lines over one parameter or as maps over two; see `hybridsim.plot.sweep`.
@@ -207,6 +214,19 @@ class Sweep(Readable):
         """Yield each error with its number of points, the most frequent error first."""
         counted = Counter(text for text in self.status.ravel().tolist() if text not in (DONE, NOT_RUN))
         yield from counted.most_common()
+
+
+class _Titles:
+    """The titles of the columns of a table, which all differ."""
+
+    def __init__(self, titles: list[str]) -> None:
+        self._taken = set(titles)
+
+    def unused(self, title: str) -> str:
+        """Return the title, with underscores appended if another column has it."""
+        title = free_name(self._taken, title) if title in self._taken else title
+        self._taken.add(title)
+        return title
 
 
 def _plain(value: Any) -> Any:

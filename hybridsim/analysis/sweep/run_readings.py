@@ -23,6 +23,7 @@ FINAL, FIRST_PASSAGE = "final", "first_passage"
 OF_QUANTITY = ("amplitude", "peak", "maximum", "minimum", "mean", "rms", "energy")
 _INTEGRATED = OF_QUANTITY[4:]
 OF_CONTACT = ("stick_fraction", "stops", "dissipated")
+OF_IMPACT = ("impacts", "impulse")
 OF_MODE = "mode_fraction"
 _PASSAGE = re.compile(r"first_passage\.([^<>]+)([<>])([^<>]+)")
 
@@ -98,9 +99,10 @@ def of_run(reading_names: Sequence[str], model: Model, options: Mapping[str, Any
     if not _are_final(reading_names):
         _refuse_parts(options)
     quantities = _quantities_of(model)
-    known = [f"{FINAL}.{name}" for name in states]
+    known = [f"{FINAL}.{name}" for name in (*states, *(each.name for each in model.discrete))]
     known += [f"{head}.{name}" for head in OF_QUANTITY for name in quantities]
     known += [f"{head}.{contact.name}" for head in OF_CONTACT for contact in model.contacts]
+    known += [f"{head}.{impact.name}" for head in OF_IMPACT for impact in model.impacts]
     known += [f"{OF_MODE}.{name}" for name in modes_of(model)]
     for word in reading_names:
         passage = passage_of(word)
@@ -157,7 +159,11 @@ def _quantities_of(model: Model) -> list[str]:
 def _reading(run: OverRun, word: str) -> float:
     head, _, name = word.partition(".")
     if head == FINAL:
-        return float(run.solution.x_end[run.solution.names.index(name)])
+        solution, names = run.solution, run.solution.names
+        if name in names:
+            return float(solution.x_end[names.index(name)])
+        held = [each.name for each in solution.model.discrete]
+        return float(point_after_end(solution).discrete[held.index(name)])
     passage = passage_of(word)
     if passage is not None:
         level = evaluate(passage.level, run.solution.model.parameter_values())

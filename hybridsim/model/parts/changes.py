@@ -10,7 +10,7 @@ from os import PathLike
 from typing import Any, TypeVar
 
 from hybridsim.errors import ExpressionError, Place, UsageError, nearest
-from hybridsim.expr import Expression, parse
+from hybridsim.expr import Expression, is_zero_dimensional, parse
 from hybridsim.model.laws.law import FrictionLaw
 from hybridsim.model.parts.contact import Contact
 from hybridsim.model.parts.quantities import Discrete, Parameter, State
@@ -48,7 +48,7 @@ def require_known(
 def require_values(changes: Mapping[str, Any], kind: str) -> None:
     """Raise an error for a value that is neither a number nor an expression."""
     for name, value in changes.items():
-        if not isinstance(value, _VALUES):
+        if not (isinstance(value, _VALUES) or is_zero_dimensional(value)):
             raise UsageError(f"{kind} {name} cannot be {value!r}", remedy="use a number or an expression")
 
 

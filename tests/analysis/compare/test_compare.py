@@ -172,6 +172,10 @@ def test_table_and_files(tmp_path) -> None:
     assert float(records[1]["state_error"]) == result.rows[1].errors.state
     assert json.loads(records[1]["options"]) == {"rtol": 1e-9}
 
+    frame = result.to_pandas()
+    assert frame["state_error"].tolist() == [row.errors.state for row in result.rows]
+    assert list(frame.columns) == list(records[0])
+
     text = result.to_json(tmp_path / "comparison.json")
     content = json.loads((tmp_path / "comparison.json").read_text(encoding="utf-8"))
     assert content == json.loads(text)

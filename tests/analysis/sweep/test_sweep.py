@@ -239,6 +239,29 @@ def test_files(tmp_path: Path) -> None:
     assert read["axes"] == {"F0": F0, "omega": OMEGA} and read["provenance"]["model"] == "dfcs"
 
 
+@pytest.mark.parametrize("mode", ["grid", "list"])
+def test_a_result_with_the_name_of_another_column_is_kept(mode: str, tmp_path: Path) -> None:
+    """The user's own status, and a result with the name of an axis, a dimension or an item of an array."""
+
+    def own(model: hs.Model) -> dict[str, object]:
+        values = {"status": 7.0, "F0": 8.0, "error": 9.0, "point": 10.0, "v[1]": 11.0}
+        return {**values, "v": np.array([12.0, 13.0])}
+
+    found = hs.sweep("dfcs", {"F0": [1, 2]}, own, mode=mode)
+    found.to_csv(tmp_path / "sweep.csv")
+    with open(tmp_path / "sweep.csv", encoding="utf-8") as file:
+        row = next(csv.DictReader(file))
+    assert {name: row[name] for name in ("F0", "F0_", "status", "status_", "error", "point")} == {
+        "F0": "1.0", "F0_": "8.0", "status": "ok", "status_": "7.0", "error": "9.0", "point": "10.0"
+    }  # fmt: skip
+    assert (row["v[0]"], row["v[1]"], row["v[1]_"]) == ("12.0", "11.0", "13.0")
+    assert list(found.to_pandas().columns) == list(row)
+    data = found.to_xarray()
+    assert data["status_"].values.tolist() == [7.0, 7.0] and data["status"].values.tolist() == ["ok", "ok"]
+    assert data["F0"].values.tolist() == [1.0, 2.0] and data["F0_"].values.tolist() == [8.0, 8.0]
+    assert found["status"].tolist() == [7.0, 7.0]
+
+
 def test_labelled_arrays() -> None:
     data = by_threads().to_xarray()
     assert data["x"].dims == ("F0", "omega") and data["state"].dims == ("F0", "omega", "item of state")

@@ -18,6 +18,10 @@ from hybridsim.model.parts.impact import ROUNDING
 # is for steps that end slightly inside.
 CORRECTIONS = 2
 
+# A start or reset may set a gap below zero by this part of the states and of the gap's rates, because it may be a state
+# of another run, which has the rounding of that run. The gap is then zero.
+_PUT_BELOW = 2.0**-46
+
 Failure = tuple[str, str]
 
 
@@ -96,10 +100,11 @@ class _Collision:
         values, bounds = self._surfaces
         for c in list(self.rates):
             row, bound = values[self.place[c]], bounds[self.place[c]]
+            size = max(np.abs(at.x).max(), np.abs(row[:3]).max()) if at.is_put else 0.0
             located = (
                 at.z[c] == automata[c].above and resolution.fired[automata[c].guards[automata[c].above][0]]
             )
-            if not located and row[0] < -bound[0]:
+            if not located and row[0] < -bound[0] - _PUT_BELOW * size:
                 state = ", ".join(f"{n} = {v:.6g}" for n, v in zip(self.system.names, at.x, strict=True))
                 return (
                     "inconsistent",
