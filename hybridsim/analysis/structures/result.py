@@ -10,7 +10,7 @@ from typing import Any, NoReturn
 import numpy as np
 
 from hybridsim.analysis.polynomials.orbit import Orbit
-from hybridsim.analysis.steady.measures import ByName
+from hybridsim.analysis.steady.by_name import ByName
 from hybridsim.analysis.steady.result import SteadyState
 from hybridsim.analysis.structures.orbits import orbit_of_contacts, orbit_of_coordinate
 from hybridsim.errors import UsageError
