@@ -10,8 +10,6 @@ from dataclasses import dataclass, field
 from numbers import Integral, Real
 from typing import Any, SupportsFloat
 
-import numpy as np
-
 from hybridsim.errors import ExpressionError, Place, nearest
 from hybridsim.expr.check import check_size, check_tree
 from hybridsim.expr.grammar import (
@@ -247,7 +245,7 @@ def check_text(text: str, where: Place, also: str = "") -> None:
 
 def is_zero_dimensional(value: object) -> bool:
     """Return whether a value is a NumPy array without dimensions, which contains one number."""
-    return isinstance(value, np.ndarray) and value.ndim == 0
+    return getattr(value, "ndim", None) == 0 and hasattr(value, "__setitem__")  # unlike a NumPy number
 
 
 def _as_text(quantity: Any, where: Place) -> str:
