@@ -29,8 +29,9 @@ def sides_along(
 ) -> tuple[np.ndarray, dict[int, int]]:
     """Choose the modes of corners and loads from the motion; return all modes, and the guards that are exactly zero.
 
-    A guard that was located at zero is zero on both sides, whatever rounding makes of its value. With has_flow=False
-    only values decide, because the modes of surfaces are not known yet.
+    A guard that was located at zero is zero on both sides, whatever rounding makes of its value. If rounding hides all
+    its derivatives, both sides are equally good. Then the computed derivatives decide, because the computed motion
+    follows them. With has_flow=False only values decide, because the modes of surfaces are not known yet.
     """
     system = resolution.system
     side_of = side_after if resolution.forward else side_before
@@ -43,6 +44,8 @@ def sides_along(
             for j, g in enumerate(automaton.guards[mode]):
                 is_zero = zero.get(c) == g
                 side, order = side_of(values[g], bounds[g], int(is_zero))
+                if side == 0 and is_zero:
+                    side, order = side_of(values[g], np.zeros_like(bounds[g]), 1)
                 if side >= 0 or not (has_flow or order == 0):
                     continue
                 target = automaton.targets[mode][j][0]

@@ -17,7 +17,7 @@ from hybridsim.engine.events.monitor_sides import MonitorSides
 from hybridsim.engine.events.outcome import Outcome
 from hybridsim.engine.events.zeno.accumulation import NOBODY, Accumulation, Limit, accumulated
 from hybridsim.engine.events.zeno.hidden_bounces import bounces_of, last_bounces, limit_of_hidden
-from hybridsim.engine.events.zeno.limits import behind, closed_now, holds_several
+from hybridsim.engine.events.zeno.limits import behind, counted_components, holds_several
 from hybridsim.engine.record.checkpoint import Checkpoint, damaged
 from hybridsim.engine.record.limits import UNLIMITED, LimitMonitor, LimitReached
 from hybridsim.engine.record.trajectory import Task, Trajectory
@@ -292,7 +292,8 @@ class ModeLoop:
             if result.passed is not None and result.passed.last is not None:
                 self.timetable.mark_done(result.passed.last)
                 steps, x_before = self.record.counters.steps - result.passed.steps, result.passed.x
-            limit = self.accumulation.limit_of_all(result.instants, result.owners)
+            counted = ~self.system.is_continuous[result.owners]
+            limit = self.accumulation.limit_of_all(result.instants[counted], result.owners[counted])
             if limit is None and len(result.owners) and not self.system.has_surface[result.owners[-1]]:
                 blocks = self.record.occurrences.blocks
                 last = last_bounces(self.system, blocks[-1] if blocks else ())
@@ -468,13 +469,11 @@ class ModeLoop:
 
     def _accumulated(self, instant: Instant, x_minus: np.ndarray, fired: tuple[int, ...]) -> bool:
         """Detect an accumulation of events; return whether the run ends at the accumulation."""
-        closed = closed_now(self.system, self.outcome)
+        closed, counted = counted_components(self.system, self.outcome, fired)
         self.accumulation.forget(closed)  # a closed contact does not bounce any more
-        changed = {c.component for c in self.outcome.changes}.difference(closed)
-        if closed and not changed:
+        if not counted:
             return False
-        changed = changed or {int(self.system.owner[g]) for g in fired} or {NOBODY}
-        limit = self.accumulation.limit(instant, tuple(sorted(changed)))
+        limit = self.accumulation.limit(instant, counted)
         bounces = bounces_of(self.outcome, instant, x_minus)
         hidden = limit_of_hidden(self.system, self.outcome, bounces, self.record)
         if hidden and limit is None and self.system.is_unilateral[list(hidden.components)].all():

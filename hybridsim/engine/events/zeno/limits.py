@@ -9,7 +9,7 @@ import numpy as np
 from hybridsim.engine.events.jumps.rest_impulses import loaded, stopped
 from hybridsim.engine.events.outcome import Change, Outcome, Situation
 from hybridsim.engine.events.resolve import EventResolution
-from hybridsim.engine.events.zeno.accumulation import Limit
+from hybridsim.engine.events.zeno.accumulation import NOBODY, Limit
 from hybridsim.engine.system.system import System
 
 LIMIT = "limit"  # guard name of the changes at a limit of events
@@ -149,14 +149,24 @@ def _at_declared_limit(
     return s, found
 
 
-def closed_now(system: System, outcome: Outcome) -> tuple[int, ...]:
-    """Return the contacts that an event has closed."""
+def counted_components(
+    system: System, outcome: Outcome, fired: Collection[int]
+) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Return the contacts that an event has closed, and the components whose events may accumulate.
+
+    Rates are the same on both sides of a continuous corner, so its events do not count: the motion goes on.
+    """
     automata = system.automata
-    return tuple(
+    closed = tuple(
         c.component
         for c in outcome.changes
         if automata[c.component].is_unilateral and c.target == automata[c.component].hold
     )
+    changed = {c.component for c in outcome.changes}.difference(closed)
+    if closed and not changed:
+        return closed, ()
+    changed = changed or {int(system.owner[g]) for g in fired} or {NOBODY}
+    return closed, tuple(sorted(c for c in changed if c == NOBODY or not system.is_continuous[c]))
 
 
 def holds_several(system: System, outcome: Outcome) -> bool:
