@@ -60,11 +60,11 @@ def timed_rows(
 ) -> list[tuple[Row, ...]]:
     """Make all runs, and return the rows of each test case in the order of its series.
 
-    First everything is run once, the loosest setting of every line before the second of any. The time of the
-    next setting of a line is predicted from its last two. A run that would take more than ten times its equal
-    share of the budget is not started; if the next runs do not all fit, the longest are dropped. The
-    remaining time goes to timed repetitions in turns, which are dropped first if it is short. Each row states
-    the outcome.
+    First everything is run once, the loosest setting of every line before the second of any. Lines that were fast
+    so far come first. The time of the next setting of a line is predicted from its last two. A run that would take
+    more than ten times its equal share of the budget is not started; if the next runs do not all fit, the longest
+    are dropped. The remaining time goes to timed repetitions in turns, which are dropped first if it is short. Each
+    row states the outcome.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def timed_rows(
             _not_fitting({run: predicted[run] for run in here if run not in too_long}, budget.left),
             f"the budget of {budget.seconds:.3g} s is spent",
         )
-        for run in here:
+        for run in sorted(here, key=lambda run: predicted[run] or _last_time(rows, run)):
             entry = entries[run.entry]
             line = entry.lines[run.line]
             value = line.values[level]
@@ -127,6 +127,12 @@ def _predicted(entries: Sequence[Entry], rows: dict[_Run, Row], run: _Run) -> fl
     line = entries[run.entry].lines[run.line]
     growth = math.log(max(cost.work / cheaper.work, 1.0)) / abs(math.log(value / earlier))
     return cost.wall_time * math.exp(growth * abs(math.log(line.values[run.level] / value)))
+
+
+def _last_time(rows: dict[_Run, Row], run: _Run) -> float:
+    """Return the seconds of the next looser setting of a run, or 0 if there is no finished one."""
+    before = rows.get(replace(run, level=run.level - 1))
+    return before.cost.wall_time if before is not None and before.cost is not None else 0.0
 
 
 def _not_fitting(predicted: dict[_Run, float], seconds: float) -> list[_Run]:

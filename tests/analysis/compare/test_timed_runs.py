@@ -76,6 +76,25 @@ def test_where_the_next_settings_do_not_fit_together_the_longest_go() -> None:
     assert "budget" in next(row.message for row in rows if row.status == "not started")
 
 
+def test_the_lines_that_were_fast_come_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The slow line takes 3 s and then the rest of the 10 s; before that the other two are run at both settings."""
+    clock = [0.0]
+    monkeypatch.setattr(time, "perf_counter", lambda: clock[0])
+    takes = {"slow": 3.0, "fast": 0.1, "faster": 0.01}
+    bench = FakeBench(lambda label, value: takes[label] * (1 if value == VALUES[0] else 5))
+    first_run = bench.first_run
+
+    def slowly(line: Series, value: float, reference: object, limit: float) -> Row:
+        clock[0] += bench.seconds(line.label, value)
+        return first_run(line, value, reference, limit)
+
+    bench.first_run = slowly
+    rows = run(bench, [Series(name, "rtol", VALUES[:2]) for name in takes], 0, 10.0)
+    assert [label for label, _ in bench.order] == ["slow", "fast", "faster", "faster", "fast", "slow"]
+    assert [row.label for row in rows] == [name for name in takes for _ in range(2)]
+    assert all(row.status == "finished" for row in rows if row.label != "slow")
+
+
 def test_after_a_run_that_had_to_be_stopped_no_tighter_one_is_tried() -> None:
     bench = FakeBench(lambda label, value: 0.01 if value > 1e-4 else 1e6)
     rows = run(bench, [Series("a", "rtol", VALUES)], 1, 10.0)
