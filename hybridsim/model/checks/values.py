@@ -143,7 +143,7 @@ def _definition(findings: Findings, part: tuple[str, Expression], values: dict[s
 def _requirement(findings: Findings, requirement: Requirement, values: dict[str, float]) -> None:
     if requirement.low.names | requirement.high.names <= values.keys():
         low, high = (_value(findings, expr, values) for expr in (requirement.low, requirement.high))
-        if low is not None and high is not None and not low < high:
+        if low is not None and high is not None and not requirement.is_met(low, high):
             findings.fail(requirement, *requirement.fault(low, high))
 
 

@@ -34,9 +34,10 @@ class Element(Declared):
         when it falls through the level ``off``, which is below ``on``. An input that stops exactly at a level does not
         pass it: for a signal of 0 and 1 use levels between them. ``initial`` is the mode at the start, "on" or "off".
     saturation
-        The input, limited to values from ``lower`` to ``upper``.
+        The input, limited to values from ``lower`` to ``upper``. The limits may be equal.
     deadband
-        Zero for an input from ``lower`` to ``upper``; beyond them the distance of the input from the nearer one.
+        Zero for an input from ``lower`` to ``upper``; beyond them the distance of the input from the nearer one. The
+        limits may be equal.
     backlash
         The position of a part with play: it stays where it is until the input is half of ``width`` away from it, and
         is then moved by the input at that distance. ``start`` is its position at the start. The input is a

@@ -9,7 +9,7 @@ from hybridsim.expr import Expression, parse
 from hybridsim.model.elements.element import Element
 from hybridsim.model.parts.declared import Declared
 
-# Fields of which the first is below the second; None is zero.
+# Fields of which the first must not be above the second; None is zero.
 _ORDERS = {
     "relay": ("off", "on"),
     "saturation": ("lower", "upper"),
@@ -17,12 +17,13 @@ _ORDERS = {
     "backlash": (None, "width"),
     "quantizer": (None, "step"),
 }
+_MAY_BE_EQUAL = ("saturation", "deadband")  # a band without width has a meaning
 _FOR_LOW_VALUES = "; for a relay that is on at low values, change the sign of the input and of both levels"
 
 
 @dataclass(frozen=True)
 class Requirement(Declared):
-    """The requirement that a value `low` is below a value `high` for the parameters of every run.
+    """The requirement that a value `low` is below a value `high`, or at most equal, for the parameters of every run.
 
     name : the element. fields : what the two values are in it, None for zero.
     """
@@ -33,12 +34,16 @@ class Requirement(Declared):
     fields: tuple[str | None, str]
     kind: str
 
+    def is_met(self, low: float, high: float) -> bool:
+        """Return whether two values have the right order."""
+        return low < high or (low == high and self.kind in _MAY_BE_EQUAL)
+
     def fault(self, low: float, high: float) -> tuple[str, str]:
         """Return the message and the remedy for values in the wrong order."""
         lower, upper = self.fields
         if lower is None:
             return f"element {self.name}: `{upper}` is {high:.6g}", f"use a value of `{upper}` above zero"
-        remedy = f"use a value of `{lower}` below that of `{upper}`"
+        remedy = f"use a value of `{lower}` {'not above' if self.kind in _MAY_BE_EQUAL else 'below'} that of `{upper}`"
         message = f"element {self.name}: `{lower}` is {low + 0.0:.6g} and `{upper}` is {high:.6g}"
         return message, remedy + (_FOR_LOW_VALUES if self.kind == "relay" else "")
 

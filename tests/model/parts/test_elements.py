@@ -109,6 +109,23 @@ def test_changed_parameters_keep_the_order_of_levels(values: dict[str, float], w
         whole.with_(A=value).validate()
 
 
+@pytest.mark.parametrize("integrator", ["exact", "taylor", "dop853", "rodas5p", "cvode-bdf"])
+@pytest.mark.parametrize("b", [0.0, 0.25])
+def test_limits_may_be_equal(integrator: str, b: float) -> None:
+    """x = t - 1 rises. Until x = 0 the dead band d has the integral -(1 - b)^2/2; with the saturation s, d + s = x."""
+    elements = [
+        hs.Element("d", "deadband", "x", lower="-b", upper="b"),
+        hs.Element("s", "saturation", "x", lower="-b", upper="b"),
+    ]
+    states = [hs.State("x", -1, 1), hs.State("left", 0, "d"), hs.State("sum", 0, "d + s - x")]
+    model = hs.Model("m", parameters={"b": 0.5}, states=states, elements=elements)
+    sol = hs.simulate(model, (0, 2), params={"b": b}, integrator=integrator, rtol=1e-9, atol=1e-12)
+    assert (sol.status, sol.warnings) == ("finished", ())
+    half = hs.simulate(model, (0, 1), params={"b": b}, integrator=integrator, rtol=1e-9, atol=1e-12)
+    assert half.x_end == pytest.approx([0.0, -((1 - b) ** 2) / 2, 0.0], abs=1e-8)
+    assert sol.x_end == pytest.approx([1.0, 0.0, 0.0], abs=1e-8)
+
+
 @pytest.mark.parametrize("ticks", [0, 1001, 2.5, True])
 def test_ticks_are_a_whole_number(ticks: object) -> None:
     with pytest.raises(HybridsimError, match="`ticks` cannot be"):
