@@ -50,7 +50,7 @@ y = {{ {element} }}
         (
             'kind = "saturation", input = "x", lower = 2, upper = "a"',
             "`lower` is 2 and `upper` is 1",
-            "below",
+            "not above",
         ),
         ('kind = "deadband", input = "x + q", lower = -1, upper = 1', "unknown name 'q'", ""),
         (
