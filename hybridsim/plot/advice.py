@@ -74,7 +74,10 @@ def _ladder(found: Advice, axes: Axes) -> None:
     style.dress(axes)
     axes.grid(axis="y", visible=False)
     axes.set_xlabel(style.literal(f"error of {found.quantity}, relative to the full model's value"))
-    style.head(axes, f"{found.model.name}, {found.quantity} within {found.tol:g}: {found.simplest.title}")
+    style.head(
+        axes,
+        f"Simplest model of {found.model.name} for {found.quantity} within {found.tol:g}: {found.simplest.title}",
+    )
 
 
 def _window(errors: Iterable[float], tol: float) -> tuple[float, float]:
