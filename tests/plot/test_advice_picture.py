@@ -44,3 +44,8 @@ def test_the_tolerance_stands_well_inside(tol: float, errors: tuple[float | None
         assert low <= at <= high
         assert (at <= tol) == (line.get_markerfacecolor() != "white")
     assert len(axes.lines) - 1 == sum(error is not None for error in errors)
+
+
+def test_the_title_names_the_question_and_the_answer() -> None:
+    title = advice(ladder(0.01, 1.0, 0.001)).get_title(loc="left")
+    assert " ".join(title.split()) == "Simplest model of dfcs for amplitude.x within 0.01: no-friction"
