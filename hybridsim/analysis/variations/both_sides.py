@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from hybridsim.analysis.variations.carried import Carrier
 from hybridsim.analysis.variations.directions import Carried, Directions
 from hybridsim.analysis.variations.off_zero import OffZero
+from hybridsim.analysis.variations.zeros.zero_function import Resting
 from hybridsim.errors import UsageError
 
 _AGREE = 1e-7  # of their sizes: derivatives on both sides that differ by less are equal
@@ -44,9 +47,13 @@ class OneSide:
         found: np.ndarray = self._carrier.own_sizes(self._directions)
         return found
 
+    def resting(self) -> Sequence[tuple[int, Resting]]:
+        """Return the functions that stay zero along a segment, each with the number of the segment."""
+        return ()
+
     def differing(self) -> list[tuple[str, np.ndarray]]:
         """Return the functions at zero whose two sides differ later, each with a mask (M,) of directions."""
-        return [(_zero_text(one), one.moves) for one in self._carried.off if one.parts]
+        return [(zero_text(one), one.moves) for one in self._carried.off if one.parts]
 
 
 class BothSides(OneSide):
@@ -121,9 +128,12 @@ class BothSides(OneSide):
             found[k][:, self._chosen] = self._agreeing_states(sides[k], lost)
         return found
 
+    def resting(self) -> Sequence[tuple[int, Resting]]:
+        return self._carried.resting
+
     def differing(self) -> list[tuple[str, np.ndarray]]:
         differs = np.isnan(self.at_end()).any(axis=0) | np.isnan(self.of_times()[1]).any(axis=0)
-        parted = [(_zero_text(one), one.moves & differs) for one in self._carried.off]
+        parted = [(zero_text(one), one.moves & differs) for one in self._carried.off]
         return [(name, mask) for name, mask in parted if mask.any()]
 
     def _lost(self, both: Carried) -> np.ndarray:
@@ -146,7 +156,8 @@ class BothSides(OneSide):
         return np.where(apart | lost, np.nan, 0.5 * (one + other))
 
 
-def _zero_text(one: OffZero) -> str:
+def zero_text(one: OffZero | Resting) -> str:
+    """Return the description of a function at zero for warnings."""
     return f"at t = {one.t:.9g} {one.name} is exactly at its zero"
 
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from hybridsim.analysis.variations.off_zero import OffZero
 from hybridsim.analysis.variations.values.table_slopes import TableValue
+from hybridsim.analysis.variations.zeros.zero_function import Resting
 
 
 @dataclass(frozen=True)
@@ -38,7 +40,8 @@ class Carried:
     off: functions exactly at zero that some directions move off zero;
     lost: times (M,) from which on directions lead to another run, or infinity;
     starts: derivatives of states and discrete states at the start of each segment;
-    shifts: derivatives (M,) of the time at which each segment starts, exactly zero if it does not move.
+    shifts: derivatives (M,) of the time at which each segment starts, exactly zero if it does not move;
+    resting: functions that stay zero along a segment, each with the number of the segment.
     """
 
     x: np.ndarray
@@ -48,3 +51,4 @@ class Carried:
     lost: np.ndarray
     starts: list[tuple[np.ndarray, np.ndarray]]
     shifts: list[np.ndarray]
+    resting: Sequence[tuple[int, Resting]] = ()

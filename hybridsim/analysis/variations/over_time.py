@@ -3,20 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from hybridsim.analysis.variations.both_sides import OneSide
+from hybridsim.analysis.variations.both_sides import OneSide, zero_text
 from hybridsim.analysis.variations.carried import Carrier
 from hybridsim.analysis.variations.directions import Directions
 from hybridsim.analysis.variations.off_zero import rates_of
 from hybridsim.analysis.variations.quantities import QuantityDerivatives
+from hybridsim.analysis.variations.zeros.zero_function import Resting
 from hybridsim.arguments import as_times
+from hybridsim.engine.record.segments import Segment
 from hybridsim.errors import UsageError, nearest
 from hybridsim.presentation.readable import Readable
 from hybridsim.solution import Solution
+
+_SAME = (
+    1e-9  # of their sizes: values and derivatives on the two sides of a zero that differ by less are equal
+)
+_ROUNDING = 1e-11  # of the size of a quantity, for a change of everything by its own size
+_FRACTIONS = np.array([0.0, 0.11, 0.53, 0.89, 1.0])  # of a segment: times at which the two sides are compared
 
 
 @dataclass(frozen=True)
@@ -84,8 +92,39 @@ class OverTime:
             chosen = np.flatnonzero(index == number)
             chosen = chosen[np.argsort(s[chosen], kind="stable")]
             Y = self._sides.within(number, s[chosen], side == "+")
-            found[chosen] = self._quantities.of(names, self.solution._segments[number], s[chosen], Y)
+            found[chosen] = self._of(names, number, s[chosen], Y)
         return found
+
+    def _of(
+        self, names: Sequence[str], number: int, s: np.ndarray, Y: np.ndarray, shift: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Return derivatives (k, m, M) of quantities; those that differ on the two sides of a zero are NaN."""
+        segment = self.solution._segments[number]
+        found = self._quantities.of(names, segment, s, Y, shift)
+        for place, one in self._sides.resting():
+            if place == number:
+                found = np.where(self._differs(names, segment, one, s, Y, found) & one.moves, np.nan, found)
+        return found
+
+    def _differs(
+        self,
+        names: Sequence[str],
+        segment: Segment,
+        one: Resting,
+        s: np.ndarray,
+        Y: np.ndarray,
+        found: np.ndarray,
+    ) -> np.ndarray:
+        """Return whether quantities or their derivatives `found` (k, m, M) differ on the other side of a zero."""
+        other, x = replace(segment, z=one.z), segment.dense(s)
+        here, there = (
+            np.array(self.solution._of_model.values_at(names, at, s, x)).T for at in (segment, other)
+        )
+        sizes = np.abs(here) + np.abs(there)
+        least = _ROUNDING * sizes[:, :, None] / self._sides.own_sizes()
+        beyond = self._quantities.of(names, other, s, Y)
+        apart = np.abs(found - beyond) > _SAME * (np.abs(found) + np.abs(beyond)) + least
+        return np.asarray(apart | (np.abs(here - there) > _SAME * sizes)[:, :, None])
 
     def moving(
         self, name: str, number: int, s: float, is_after: bool, shift: np.ndarray | None
@@ -98,7 +137,7 @@ class OverTime:
             x = segment.dense(stops)[0]
             Y = Y.copy()
             Y[0, : system.n] += np.outer(rates_of(system, s, x, segment.p, segment.z), shift)
-        found: np.ndarray = self._quantities.of((name,), segment, stops, Y, shift)[0, 0]
+        found: np.ndarray = self._of((name,), number, stops, Y, shift)[0, 0]
         return found
 
     def shift(self, number: int) -> np.ndarray:
@@ -119,4 +158,14 @@ class OverTime:
 
     def differing(self) -> list[tuple[str, np.ndarray]]:
         """List the functions at zero with different derivatives on both sides, each with a mask (M,) of directions."""
-        return self._sides.differing()
+        found = dict(self._sides.differing())
+        names = [output.name for output in self.solution.model.outputs]
+        for number, one in self._sides.resting() if names else ():
+            segment = self.solution._segments[number]
+            stops = segment.s[0] + _FRACTIONS * (segment.s[-1] - segment.s[0])
+            Y = self._sides.within(number, stops, True)
+            slopes = self._quantities.of(names, segment, stops, Y)
+            differs = self._differs(names, segment, one, stops, Y, slopes).any(axis=(0, 1)) & one.moves
+            if differs.any():
+                found[zero_text(one)] = found.get(zero_text(one), False) | differs
+        return list(found.items())

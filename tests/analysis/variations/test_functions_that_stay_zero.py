@@ -218,3 +218,46 @@ definitions.t_on = "sin(t)**2"
     found = hs.steady_state(built)
     with pytest.raises(hs.UsageError, match=r"no multipliers: .*abs\(y\) is exactly at its zero"):
         _ = found.multipliers
+
+
+# An output, its one-sided derivatives by q (or their sign, if infinite), and what `at` returns.
+OUTPUTS = {
+    "s*y": ([-1.0, 1.0], NAN),
+    "s": ([math.inf, math.inf], NAN),
+    "abs(y) + s*y": ([-2.0, 2.0], NAN),
+    "u": ([-math.inf, 0.0], NAN),
+    "3*y + 0*s": ([3.0, 3.0], 3.0),
+    "s*y**2 + q": ([1.0, 1.0], 1.0),
+    "s*x": ([0.0, 0.0], 0.0),
+}
+
+
+@pytest.mark.parametrize("integrator", ["exact", "taylor", "dop853", "scipy-rk45"])
+@pytest.mark.parametrize("output", OUTPUTS)
+def test_an_output_that_reads_the_side_of_a_zero(output: str, integrator: str) -> None:
+    """The states have equal derivatives on both sides; x is zero on both."""
+    sides, expected = OUTPUTS[output]
+    declared = 'states.y = { start = "q", der = "0" }\nstates.x = { start = 0, der = "0" }\n'
+    part = SWITCH if output == "u" else SIGN
+    built = model(f'{declared}outputs.r = "{output}"\n{part}')
+    h, base = 1e-6, hs.simulate(built, (0, END), integrator=integrator).output("r", 0.5)
+    for sign, known in zip((-1.0, 1.0), sides, strict=True):
+        run = hs.simulate(built, (0, END), params={"q": sign * h}, integrator=integrator)
+        step = (run.output("r", 0.5) - base) / (sign * h)
+        assert (
+            step * math.copysign(1.0, known) > 1e4
+            if math.isinf(known)
+            else step == pytest.approx(known, abs=1e-5)
+        )
+    found = hs.sensitivities(hs.simulate(built, (0, END), integrator=integrator), ["q"])
+    assert found.by_parameter[0, 0] == 1.0
+    for t in (0.5, [0.3, 1.0]):
+        assert found.at(t, "r").by_parameter.ravel() == pytest.approx(
+            np.full(np.size(t), expected), nan_ok=True
+        )
+    assert np.isnan(found.of("integral", "r").by_parameter[0]) == math.isnan(expected)
+    assert found.at(0.5, "y").by_parameter[0, 0] == 1.0
+    warned = [text for text in found.warnings if " q " in text]
+    assert bool(warned) == math.isnan(expected)
+    name = "guard low of g" if output == "u" else "s"
+    assert all(f"at t = 0 {name} is exactly at its zero" in text for text in warned)

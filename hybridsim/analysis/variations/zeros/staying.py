@@ -22,7 +22,7 @@ from hybridsim.analysis.variations.off_zero import OffZero, rates_of
 from hybridsim.analysis.variations.rounds import Rounds
 from hybridsim.analysis.variations.tapes import tangent_tape
 from hybridsim.analysis.variations.zeros.monitors import monitors_reached
-from hybridsim.analysis.variations.zeros.zero_function import ZeroFunction
+from hybridsim.analysis.variations.zeros.zero_function import Resting, ZeroFunction
 from hybridsim.engine.record.segments import Segment
 from hybridsim.engine.series.bounded import ORDER, UNIT
 from hybridsim.engine.system.system import System
@@ -39,11 +39,15 @@ Over = Callable[[np.ndarray], np.ndarray]
 
 
 class Staying:
-    """The functions, and the numbers of the monitors, that are zero with zero rate at an instant of a run."""
+    """The functions, and the numbers of the monitors, that are zero with zero rate at an instant of a run.
+
+    resting : the functions that stay zero along a segment, each with the number of the segment.
+    """
 
     def __init__(self) -> None:
         self.zeros: list[ZeroFunction] = []
         self.monitors: list[int] = []
+        self.resting: list[tuple[int, Resting]] = []
 
     def __bool__(self) -> bool:
         return bool(self.zeros or self.monitors)
@@ -53,13 +57,14 @@ class Staying:
         self.zeros = [one for one in self.zeros if one.gone is not None] + zeros
 
     def follow(
-        self, changes: Changes, segment: Segment, Yd: np.ndarray, shift: np.ndarray, over: Over
+        self, changes: Changes, number: int, segment: Segment, Yd: np.ndarray, shift: np.ndarray, over: Over
     ) -> list[OffZero]:
         """Follow the functions and monitors along a segment, and return the effects on the derivatives."""
         if not self or len(segment.s) < 2:
             return []
         follower = Follower(changes, segment, Yd, shift, over)
         followed = [follower.follow(one) for one in self.zeros]
+        self.resting += [(number, one) for one in follower.resting]
         self.zeros = [one for one, _ in followed if one is not None]
         off, self.monitors = monitors_reached(changes, follower.at_start(), segment, self.monitors)
         return [one for _, found in followed for one in found] + off
@@ -89,6 +94,7 @@ class Follower:
     ) -> None:
         self._changes, self._system, self._segment, self._over = changes, changes.system, segment, over
         self._Yd, self._shift = Yd, shift
+        self.resting: list[Resting] = []
 
     def follow(self, zero: ZeroFunction) -> tuple[ZeroFunction | None, list[OffZero]]:
         """Return the function to follow after the segment, or None, and its effects on the derivatives."""
@@ -103,6 +109,7 @@ class Follower:
         if not all(one.is_zero for one in found):
             return None, self._leaving(seen, points[0], found[0])
         moves, lost = np.zeros(width, dtype=bool), np.zeros(width, dtype=bool)
+        self._rests(seen, np.any([one.moves for one in found], axis=0))
         for at, one in zip(points, found, strict=True):
             if not (one.moves & ~seen.noted).any():
                 continue
@@ -117,11 +124,18 @@ class Follower:
         if mode == zero.there:
             return None, []
         parted = np.full(len(zero.gone), mode != zero.here)
+        self._rests(zero, zero.gone)
         for at in self._along(_FRACTIONS):
             parted |= self._parted(zero, at)
         parted &= zero.gone
         rest = zero.gone & ~parted
         return (zero._replace(gone=rest) if rest.any() else None), self._off(zero, parted, parted)
+
+    def _rests(self, zero: ZeroFunction, moves: np.ndarray) -> None:
+        if moves.any():
+            z = self._segment.z.copy()
+            z[zero.c] = zero.there
+            self.resting.append(Resting(float(self._segment.start), zero.name, moves, z))
 
     def _leaving(self, zero: ZeroFunction, at: Place, one: Changed) -> list[OffZero]:
         """Return the effects of a function that becomes nonzero at the start of the segment."""

@@ -9,6 +9,18 @@ import numpy as np
 from hybridsim.engine.system.system import System
 
 
+class Resting(NamedTuple):
+    """A function that is zero along a segment, which begins at time t.
+
+    moves : mask (M,) of the directions that make it nonzero. z (C,) : the modes on its other side.
+    """
+
+    t: float
+    name: str
+    moves: np.ndarray
+    z: np.ndarray
+
+
 class ZeroFunction(NamedTuple):
     """A guard or surface of component `c` that is zero with zero rate, in the mode `here`.
 
