@@ -15,6 +15,16 @@ from hybridsim.solution.solution import Solution
 _EARLY = ("limit", "interrupted")
 
 
+def _discrete_states(solution: Solution) -> str:
+    """Return the discrete states at the end of a run, which ``sol.y`` does not contain, as a part of a remedy."""
+    names = [each.name for each in solution.model.discrete]
+    if not names or not solution._segments:
+        return ""
+    values = solution._system.discrete(solution._segments[-1].p).tolist()
+    listed = ", ".join(f"{name!r}: {value!r}" for name, value in zip(names, values, strict=True))
+    return f" and the discrete states {{{listed}}}, all in x0"
+
+
 def resumed(
     solution: Solution,
     t_end: float | None,
@@ -27,7 +37,7 @@ def resumed(
     if solution.status not in ("finished", *_EARLY) or checkpoint is None:
         raise UsageError(
             f"the run of {run.model.name} cannot be resumed: {solution.status}, {solution.message}",
-            remedy="start a new run from sol.y[:, -1] with other settings",
+            remedy=f"start a new run with other settings from sol.y[:, -1]{_discrete_states(solution)}",
         )
     end = task.t1 if t_end is None else arguments.number(t_end, "t_end")
     if not math.isfinite(end):

@@ -13,7 +13,7 @@ from hybridsim.engine.run.single_call import LazyTrajectory
 from hybridsim.engine.system.user_functions.code import PythonCode
 from hybridsim.errors import RunInterrupted
 from hybridsim.model.checks.denominators import denominators
-from hybridsim.model.checks.doubtful import jumps_of
+from hybridsim.model.checks.doubtful import jumps_of, touches_of
 from hybridsim.solution.model_trajectory import ModelTrajectory
 from hybridsim.solution.poles import end_at_pole, end_before_pole, may_end_at_pole, passed_unseen
 from hybridsim.solution.run import Run
@@ -48,7 +48,7 @@ def _close(run: Run, trajectory: Trajectory) -> None:
     """Add the warnings of the run, and drop data that `keep` excludes."""
     if isinstance(run.system.code, PythonCode):
         run.system.code.report(trajectory)
-    for caution in jumps_of(run.model):
+    for caution in (*jumps_of(run.model), *touches_of(run.model)):
         trajectory.warnings[caution.sentence] = 1
     end_at_pole(run.system, trajectory)
     end_before_pole(run.system, trajectory, run.task)

@@ -247,3 +247,43 @@ def test_walls_that_lead_apart_in_a_corner_end_the_run(integrator: str) -> None:
     assert sol.status == "nonunique"
     assert "right leads to up and top leads to down" in sol.message
     assert sol.t_end == pytest.approx(1.0, abs=1e-9)
+
+
+def bouncing(monitored: str) -> hs.Model:
+    return hs.Model(
+        "bouncing",
+        states=[hs.State("h", 1, "w"), hs.State("w", 0, "-9.81 + p")],
+        definitions={"doubled": "2*h"},
+        impacts=[hs.Impact("p", gap="h", restitution=0.5)],
+        monitors=[hs.Monitor("m", monitored)],
+    )
+
+
+@pytest.mark.parametrize("integrator", ["exact", "dop853", "scipy-rk45"])
+def test_a_monitor_of_a_gap_is_warned_of(integrator: str) -> None:
+    """The gap keeps its sign in a collision; its rate changes its sign."""
+    for monitored in ("h", "-3*h", "doubled"):
+        sol = hs.simulate(bouncing(monitored), (0, 0.6), integrator=integrator)
+        (told,) = sol.warnings
+        assert f"monitor m: '{monitored}' only touches zero at the events of p" in told
+        assert "sol.event_times('p')" in told and not len(sol.event_times("m"))
+        assert len(sol.event_times("p")) == 1
+    for monitored in ("w", "h - 0.5"):
+        sol = hs.simulate(bouncing(monitored), (0, 0.6), integrator=integrator)
+        assert not sol.warnings and len(sol.event_times("m")) >= 1
+
+
+def test_a_monitor_of_a_guard_that_leads_back_to_its_mode_is_warned_of() -> None:
+    bounce = hs.Component(
+        "ball",
+        [hs.Mode("flight", hs.Guard("floor", "h", hs.Choice("flight", reset={"w": "-w/2"})))],
+        initial="flight",
+    )
+    model = hs.Model(
+        "counted",
+        states=[hs.State("h", 1, "w"), hs.State("w", 0, "-9.81")],
+        components=[bounce],
+        monitors=[hs.Monitor("m", "2*h", "down")],
+    )
+    (told,) = hs.simulate(model, (0, 0.6)).warnings
+    assert "only touches zero at the events of ball" in told

@@ -335,3 +335,18 @@ def test_a_file_that_was_changed_is_refused(tmp_path: Path) -> None:
             np.savez(file, **{**arrays, name: value})
         with pytest.raises(hs.UsageError, match=r"does not match its checksum|version 3"):
             hs.load_solution(tmp_path / "other.hsol")
+
+
+def test_the_remedy_after_a_termination_names_the_discrete_states() -> None:
+    """They are not in sol.y, so a new run from it would begin with their declared values."""
+    model = hs.Model(
+        "ended",
+        states=[hs.State("x", 0, "n + 1")],
+        discrete=[hs.Discrete("n", 0)],
+        schedules=[hs.Schedule("k", times=[0.5], reset={"n": "n + 2"})],
+        monitors=[hs.Monitor("end", "x - 1", "up", "terminate")],
+    )
+    sol = hs.simulate(model, (0, 2))
+    with pytest.raises(hs.UsageError) as fault:
+        sol.resume(2.0)
+    assert "the discrete states {'n': 2.0}, all in x0" in str(fault.value.remedy)

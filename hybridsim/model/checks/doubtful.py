@@ -38,6 +38,7 @@ def warnings_of(model: Model) -> tuple[Caution, ...]:
         *unit_faults(model),
         *_of_pulses(model),
         *jumps_of(model),
+        *touches_of(model),
         *_of_powers(model),
         *forces_of(model),
         *(Caution(message, contact.place, remedy) for contact, message, remedy in wrong_reactions(model)),
@@ -62,6 +63,34 @@ def jumps_of(model: Model) -> tuple[Caution, ...]:
     """Return warnings about jumps that are not treated as switching surfaces; runs report them too."""
     found: tuple[Caution, ...] = model.once("jumps", lambda: tuple(_of_jumps(model)))
     return found
+
+
+def touches_of(model: Model) -> tuple[Caution, ...]:
+    """Return warnings about monitors of functions that collisions keep from changing sign; runs report them too."""
+    found: tuple[Caution, ...] = model.once("touches", lambda: tuple(_of_touches(model)))
+    return found
+
+
+def _of_touches(model: Model) -> Iterator[Caution]:
+    if not model.monitors or model.flow is not None:
+        return
+    meanings = Meanings(model)
+    touched = {meanings.family(one.gap.tree)[0]: one.name for one in model.impacts}
+    for component in model.components:
+        for mode in component.modes:
+            for guard in mode.guards:  # a guard that fires and leads back to its mode is positive afterwards
+                if guard.then and all(choice.to == mode.name for choice in guard.then):
+                    touched.setdefault(meanings.family(guard.expr.tree)[0], component.name)
+    for monitor in model.monitors:
+        name = touched.get(meanings.family(monitor.expr.tree)[0])
+        if name is not None:
+            yield Caution(
+                f"monitor {monitor.name}: '{monitor.expr.text}' only touches zero at the events of {name} and keeps "
+                "its sign, so it fires only if it remains at zero",
+                monitor.expr.place or monitor.place,
+                f"read the times of these events, sol.event_times('{name}'), or monitor the velocity, which changes "
+                "its sign",
+            )
 
 
 class _Flow:
