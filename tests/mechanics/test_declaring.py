@@ -70,3 +70,21 @@ def test_contacts_that_all_share_their_coordinates_need_the_arrays() -> None:
     """The ordinary model evaluates one state from each contact that sticks, one after the other: here there is none."""
     with pytest.raises(hs.ModelError, match="of f0, f1 depend on each other in a circle"):
         hs.simulate(stuck_system().to_model(), (0, 1))
+
+
+@pytest.mark.parametrize(
+    "ask",
+    [
+        lambda system: hs.steady_state(system, params={"normal": 7.0}),
+        lambda system: hs.frequency_response(system, [1.0], params={"normal": 7.0}),
+        lambda system: hs.sweep(system, {"omega": [1.0]}, "steady", params={"normal": 7.0}),
+    ],
+    ids=["steady_state", "frequency_response", "sweep"],
+)
+def test_a_name_for_all_contacts_is_refused_if_their_values_differ(ask) -> None:
+    """The normal loads are 1.0 and 1.3, so that one load for both contacts would be another system."""
+    system = hs.two_blocks_on_belt().with_(forcing={0: hs.Harmonic(0.3, 1.0)})
+    with pytest.raises(
+        hs.UsageError, match=r"(?s)different values of 'normal'.*set each contact: f1\.normal, f2\.normal"
+    ):
+        ask(system)

@@ -38,12 +38,16 @@ def with_values(system: MechanicalSystem, values: Mapping[str, float]) -> Mechan
     Raises
     ------
     UsageError
-        For a name that the system does not have.
+        For a name that the system does not have, or that stands for different values of its contacts.
     """
     of_contacts = {c.name: _of_contact(c) for c in system.contacts}
-    names = {name for own in of_contacts.values() for name in own}
-    known = [*values_of(system), *names]
+    known = list(values_of(system))
     for name in values:
+        if owners := [f"{c}.{name}" for c, own in of_contacts.items() if name not in known and name in own]:
+            raise UsageError(
+                f"{system.name}: its contacts have different values of {name!r}, so this name stands for none of them",
+                remedy=f"set each contact: {', '.join(owners[:4])}{', ...' if len(owners) > 4 else ''}",
+            )
         if name not in known:
             raise UsageError(
                 f"{system.name} has no parameter {name!r} to set",
