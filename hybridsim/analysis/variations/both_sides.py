@@ -9,7 +9,7 @@ import numpy as np
 from hybridsim.analysis.variations.carried import Carrier
 from hybridsim.analysis.variations.directions import Carried, Directions
 from hybridsim.analysis.variations.off_zero import OffZero
-from hybridsim.analysis.variations.zeros.zero_function import Resting
+from hybridsim.analysis.variations.zeros.zero_function import StaysZero
 from hybridsim.errors import UsageError
 
 _AGREE = 1e-7  # of their sizes: derivatives on both sides that differ by less are equal
@@ -47,7 +47,7 @@ class OneSide:
         found: np.ndarray = self._carrier.own_sizes(self._directions)
         return found
 
-    def resting(self) -> Sequence[tuple[int, Resting]]:
+    def stays_zero(self) -> Sequence[tuple[int, StaysZero]]:
         """Return the functions that stay zero along a segment, each with the number of the segment."""
         return ()
 
@@ -128,8 +128,8 @@ class BothSides(OneSide):
             found[k][:, self._chosen] = self._agreeing_states(sides[k], lost)
         return found
 
-    def resting(self) -> Sequence[tuple[int, Resting]]:
-        return self._carried.resting
+    def stays_zero(self) -> Sequence[tuple[int, StaysZero]]:
+        return self._carried.stays_zero
 
     def differing(self) -> list[tuple[str, np.ndarray]]:
         differs = np.isnan(self.at_end()).any(axis=0) | np.isnan(self.of_times()[1]).any(axis=0)
@@ -156,7 +156,7 @@ class BothSides(OneSide):
         return np.where(apart | lost, np.nan, 0.5 * (one + other))
 
 
-def zero_text(one: OffZero | Resting) -> str:
+def zero_text(one: OffZero | StaysZero) -> str:
     """Return the description of a function at zero for warnings."""
     return f"at t = {one.t:.9g} {one.name} is exactly at its zero"
 

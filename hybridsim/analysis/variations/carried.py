@@ -123,7 +123,7 @@ class Carrier:
         if last is not None:
             Y, Yd = self._at_end(last, all_segment_events[-1].segment, Y, Yd)
             starts[-1] = Y, Yd
-        return Carried(Y, Yd, times, self._off, self._lost, starts, shifts, self._staying.resting)
+        return Carried(Y, Yd, times, self._off, self._lost, starts, shifts, self._staying.stays_zero)
 
     def _ordinary(self, Y: np.ndarray, Yd: np.ndarray, G: np.ndarray) -> Carried | None:
         """Carry derivatives from start to end in compiled code; return None if an event of the run is not ordinary."""

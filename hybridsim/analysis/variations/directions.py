@@ -9,7 +9,7 @@ import numpy as np
 
 from hybridsim.analysis.variations.off_zero import OffZero
 from hybridsim.analysis.variations.values.table_slopes import TableValue
-from hybridsim.analysis.variations.zeros.zero_function import Resting
+from hybridsim.analysis.variations.zeros.zero_function import StaysZero
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class Carried:
     lost: times (M,) from which on directions lead to another run, or infinity;
     starts: derivatives of states and discrete states at the start of each segment;
     shifts: derivatives (M,) of the time at which each segment starts, exactly zero if it does not move;
-    resting: functions that stay zero along a segment, each with the number of the segment.
+    stays_zero: functions that stay zero along a segment, each with the number of the segment.
     """
 
     x: np.ndarray
@@ -51,4 +51,4 @@ class Carried:
     lost: np.ndarray
     starts: list[tuple[np.ndarray, np.ndarray]]
     shifts: list[np.ndarray]
-    resting: Sequence[tuple[int, Resting]] = ()
+    stays_zero: Sequence[tuple[int, StaysZero]] = ()

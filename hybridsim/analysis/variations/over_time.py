@@ -13,7 +13,7 @@ from hybridsim.analysis.variations.carried import Carrier
 from hybridsim.analysis.variations.directions import Directions
 from hybridsim.analysis.variations.off_zero import rates_of
 from hybridsim.analysis.variations.quantities import QuantityDerivatives
-from hybridsim.analysis.variations.zeros.zero_function import Resting
+from hybridsim.analysis.variations.zeros.zero_function import StaysZero
 from hybridsim.arguments import as_times
 from hybridsim.engine.record.segments import Segment
 from hybridsim.errors import UsageError, nearest
@@ -101,7 +101,7 @@ class OverTime:
         """Return derivatives (k, m, M) of quantities; those that differ on the two sides of a zero are NaN."""
         segment = self.solution._segments[number]
         found = self._quantities.of(names, segment, s, Y, shift)
-        for place, one in self._sides.resting():
+        for place, one in self._sides.stays_zero():
             if place == number:
                 found = np.where(self._differs(names, segment, one, s, Y, found) & one.moves, np.nan, found)
         return found
@@ -110,7 +110,7 @@ class OverTime:
         self,
         names: Sequence[str],
         segment: Segment,
-        one: Resting,
+        one: StaysZero,
         s: np.ndarray,
         Y: np.ndarray,
         found: np.ndarray,
@@ -160,7 +160,7 @@ class OverTime:
         """List the functions at zero with different derivatives on both sides, each with a mask (M,) of directions."""
         found = dict(self._sides.differing())
         names = [output.name for output in self.solution.model.outputs]
-        for number, one in self._sides.resting() if names else ():
+        for number, one in self._sides.stays_zero() if names else ():
             segment = self.solution._segments[number]
             stops = segment.s[0] + _FRACTIONS * (segment.s[-1] - segment.s[0])
             Y = self._sides.within(number, stops, True)

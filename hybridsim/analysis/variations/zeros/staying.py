@@ -22,7 +22,7 @@ from hybridsim.analysis.variations.off_zero import OffZero, rates_of
 from hybridsim.analysis.variations.rounds import Rounds
 from hybridsim.analysis.variations.tapes import tangent_tape
 from hybridsim.analysis.variations.zeros.monitors import monitors_reached
-from hybridsim.analysis.variations.zeros.zero_function import Resting, ZeroFunction
+from hybridsim.analysis.variations.zeros.zero_function import StaysZero, ZeroFunction
 from hybridsim.engine.record.segments import Segment
 from hybridsim.engine.series.bounded import ORDER, UNIT
 from hybridsim.engine.system.system import System
@@ -41,13 +41,13 @@ Over = Callable[[np.ndarray], np.ndarray]
 class Staying:
     """The functions, and the numbers of the monitors, that are zero with zero rate at an instant of a run.
 
-    resting : the functions that stay zero along a segment, each with the number of the segment.
+    stays_zero : the functions that stay zero along a segment, each with the number of the segment.
     """
 
     def __init__(self) -> None:
         self.zeros: list[ZeroFunction] = []
         self.monitors: list[int] = []
-        self.resting: list[tuple[int, Resting]] = []
+        self.stays_zero: list[tuple[int, StaysZero]] = []
 
     def __bool__(self) -> bool:
         return bool(self.zeros or self.monitors)
@@ -64,7 +64,7 @@ class Staying:
             return []
         follower = Follower(changes, segment, Yd, shift, over)
         followed = [follower.follow(one) for one in self.zeros]
-        self.resting += [(number, one) for one in follower.resting]
+        self.stays_zero += [(number, one) for one in follower.stays_zero]
         self.zeros = [one for one, _ in followed if one is not None]
         off, self.monitors = monitors_reached(changes, follower.at_start(), segment, self.monitors)
         return [one for _, found in followed for one in found] + off
@@ -94,7 +94,7 @@ class Follower:
     ) -> None:
         self._changes, self._system, self._segment, self._over = changes, changes.system, segment, over
         self._Yd, self._shift = Yd, shift
-        self.resting: list[Resting] = []
+        self.stays_zero: list[StaysZero] = []
 
     def follow(self, zero: ZeroFunction) -> tuple[ZeroFunction | None, list[OffZero]]:
         """Return the function to follow after the segment, or None, and its effects on the derivatives."""
@@ -135,7 +135,7 @@ class Follower:
         if moves.any():
             z = self._segment.z.copy()
             z[zero.c] = zero.there
-            self.resting.append(Resting(float(self._segment.start), zero.name, moves, z))
+            self.stays_zero.append(StaysZero(float(self._segment.start), zero.name, moves, z))
 
     def _leaving(self, zero: ZeroFunction, at: Place, one: Changed) -> list[OffZero]:
         """Return the effects of a function that becomes nonzero at the start of the segment."""

@@ -9,7 +9,7 @@ import numpy as np
 from hybridsim.engine.system.system import System
 
 
-class Resting(NamedTuple):
+class StaysZero(NamedTuple):
     """A function that is zero along a segment, which begins at time t.
 
     moves : mask (M,) of the directions that make it nonzero. z (C,) : the modes on its other side.
