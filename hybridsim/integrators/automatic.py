@@ -10,6 +10,7 @@ from hybridsim.engine.events.monitor_corners import corners_of_monitors
 from hybridsim.engine.events.outcome import Situation
 from hybridsim.engine.events.resolve import EventResolution
 from hybridsim.engine.linear.modes import is_linear_beside_corners, what_is_not_linear
+from hybridsim.engine.run.headway import cost, cost_of_restarts
 from hybridsim.engine.system.instant import Instant
 from hybridsim.engine.system.system import System
 from hybridsim.engine.system.user_functions.code import PythonCode
@@ -36,7 +37,8 @@ def choose(system: System, x0: np.ndarray, z0: np.ndarray, span: tuple[float, fl
     """Choose an integrator for a model with given initial values and tolerance.
 
     The closed form is chosen for linear modes if it runs in compiled code, a stiff method if stability would
-    limit the step of an explicit one, and an explicit method otherwise. Stiffness is detected at the start,
+    limit the step of an explicit one, unless it would restart at too many clock ticks, and an explicit method
+    otherwise. Stiffness is detected at the start,
     from the eigenvalues of the Jacobian. Stiffness that begins later is detected during the run, see
     `successor_of`.
     """
@@ -52,7 +54,8 @@ def choose(system: System, x0: np.ndarray, z0: np.ndarray, span: tuple[float, fl
         rest = f" (the model has {obstacle}, so exact may be slower; pass integrator='exact' to try it)"
     steps = _steps_for_stability(system, x0, z0, span)
     in_python = bool(model.inputs) or system.has_corners or span[1] < span[0]
-    if steps > _MANY or (steps > _MANY_IN_PYTHON and in_python and _is_apart(system, x0, z0, span[0])):
+    is_stiff = steps > _MANY or (steps > _MANY_IN_PYTHON and in_python and _is_apart(system, x0, z0, span[0]))
+    if is_stiff and not _restarts_too_often(system, steps, span):
         return Choice("rodas5p", f"for stability an explicit method would need {steps:.0e} steps")
     if system.has_corners:
         return Choice(
@@ -61,6 +64,15 @@ def choose(system: System, x0: np.ndarray, z0: np.ndarray, span: tuple[float, fl
     if rtol < _TIGHT:
         return Choice("taylor", f"its modes are smooth and the tolerance is tight{rest}")
     return Choice("dop853", f"its modes are smooth and not stiff at the start{rest}")
+
+
+def _restarts_too_often(system: System, steps: float, span: tuple[float, float]) -> bool:
+    """Return whether rodas5p, which restarts at each clock tick, would take longer than explicit steps."""
+    is_compiled = (
+        span[1] >= span[0] and not system.has_corners and all(s.is_polynomial for s in system.signals)
+    )
+    explicit = cost(0.0, steps, 0.0) if is_compiled else cost(steps, 0.0, 0.0)
+    return explicit < cost_of_restarts(system, abs(span[1] - span[0]))
 
 
 def _monitors_for_python(system: System) -> str:

@@ -31,6 +31,28 @@ def test_steps_kept_short_by_stability(integrator: str) -> None:
     assert decay == pytest.approx(1 / 2e3, rel=1e-3)
 
 
+def sampled(period: float) -> hs.Model:
+    """A state that follows a triangle wave 1e5 times faster than the wave turns, and a clock that counts."""
+    return hs.Model(
+        "sampled",
+        states=[hs.State("x", 0, der="-1e5*(x - u)")],
+        inputs=[hs.Input("u", "wave", shape="triangle", period=1)],
+        discrete=[hs.Discrete("n", 0)],
+        schedules=[hs.Schedule("tick", period=period, reset={"n": "n + 1"})],
+    )
+
+
+@pytest.mark.parametrize(("period", "name"), [(0.5, "rodas5p"), (2.0**-10, "dop853")])
+def test_auto_counts_the_restarts_at_clock_ticks(period: float, name: str) -> None:
+    """The explicit method needs 33000 compiled steps; the implicit one restarts twice or a thousand times."""
+    assert hs.simulate(sampled(period), (0, 1)).integrator == name
+
+
+def test_no_implicit_method_is_recommended_if_it_restarts_at_each_tick() -> None:
+    (warning,) = told(hs.simulate(sampled(2.0**-10), (0, 1), integrator="dop853"), "stiff")
+    assert "restart at each clock tick" in warning and "rodas5p" not in warning
+
+
 @pytest.mark.parametrize(
     ("integrator", "k"), [("rodas5p", 2e3), ("scipy-radau", 2e3), ("dop853", 1.0), ("tsit5", 1.0)]
 )

@@ -11,10 +11,12 @@ from hybridsim.engine.run.segment_run import SegmentRun
 from hybridsim.engine.system.failures import StepFailure
 from hybridsim.engine.system.instant import Instant
 from hybridsim.engine.system.system import System
+from hybridsim.expr import evaluate
 
 # Approximate seconds for a step in Python, a step in compiled code, and an event. The cost is computed from counts, so
 # that a run ends at the same step on every machine.
 _STEP, _COMPILED_STEP, _EVENT = 1e-4, 1e-6, 1e-5
+_STEPS_AFTER_TICK = 30  # approximate number of steps of a stiff method between clock ticks, where it restarts
 _WINDOW = 0.5  # cost in seconds between judgements
 _WINDOWS = 3  # consecutive windows without a better pace before a run counts as slow
 _BETTER = 2.0  # ratio of paces that counts as an improvement
@@ -46,6 +48,13 @@ HEADWAY_SIZE, HEADWAY_PACE = (
 def cost(steps: float, compiled: float, events: float) -> float:
     """Return an estimated time in seconds for numbers of Python steps, compiled steps and events."""
     return steps * _STEP + compiled * _COMPILED_STEP + events * _EVENT
+
+
+def cost_of_restarts(system: System, duration: float) -> float:
+    """Return the least time in seconds for a stiff method, which steps in Python and restarts at each clock tick."""
+    values = system.values
+    periods = [evaluate(s.period, values) for s in system.model.schedules if s.period is not None]
+    return cost(_STEPS_AFTER_TICK * duration / min(periods), 0.0, 0.0) if periods else 0.0
 
 
 class NoHeadway(StepFailure):
@@ -101,7 +110,9 @@ class Headway:
 
     def is_sooner(self, now: Instant, h: float, compiled: bool) -> bool:
         """Return whether a stiff method is probably faster than steps of length `h` up to the end."""
-        return abs(self.end.minus(now)) * (_COMPILED_STEP if compiled else _STEP) > _SOONER * abs(h)
+        left = abs(self.end.minus(now))
+        explicit = left / abs(h) * (_COMPILED_STEP if compiled else _STEP)
+        return explicit > max(_SOONER, cost_of_restarts(self.system, left))
 
     def _spent(self) -> float:
         compiled = self.counters.steps - self._steps - self._in_python

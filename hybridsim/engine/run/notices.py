@@ -17,7 +17,7 @@ from hybridsim.engine.native.kernels import call, kernel
 from hybridsim.engine.record.counters import Counters
 from hybridsim.engine.record.segments import Occurrence
 from hybridsim.engine.record.trajectory import Task, Trajectory
-from hybridsim.engine.run.headway import Headway
+from hybridsim.engine.run.headway import Headway, cost, cost_of_restarts
 from hybridsim.engine.run.method_kernels import STEPS_PER_LOOK
 from hybridsim.engine.run.segment_run import SegmentRun
 from hybridsim.engine.run.stepping import Flow, Method
@@ -165,9 +165,14 @@ class Notices:
             self.takes_over = True
             return
         self._done.add("stiff")
+        explicit = cost(0.0, 1.0 / h, 0.0) if self._is_compiled else cost(1.0 / h, 0.0, 0.0)
+        if explicit < cost_of_restarts(system, 1.0):
+            advice = "Implicit methods restart at each clock tick, so they are probably not faster."
+        else:
+            advice = "rodas5p, cvode-bdf or scipy-radau will be faster."
         self.record.warn(
             f"stiff: at t = {float(now):.9g} stability, not accuracy, limits the step to {h:.3g} (time constant "
-            f"{h / lengths[longest]:.3g}). rodas5p, cvode-bdf or scipy-radau will be faster."
+            f"{h / lengths[longest]:.3g}). {advice}"
         )
 
     def _fastest_turning(self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> float:
