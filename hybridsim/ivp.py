@@ -79,8 +79,14 @@ def to_ivp(
     from hybridsim.engine.system.instant import Instant
     from hybridsim.engine.system.sides import modes_by_state
     from hybridsim.engine.system.system import System
+    from hybridsim.model.smoothing.whole_numbers import with_whole_numbers
 
     model = chosen_model(model, params).validate()
+    if with_whole_numbers(model) is not model:
+        raise UsageError(
+            f"model {model.name} contains floor, mod or round, whose whole numbers change inside a mode",
+            remedy="use hs.simulate, or write the number as a discrete state",
+        )
     announce_compilation()
     system = System(model, as_written=True)
     modes = _modes(system, z)

@@ -15,6 +15,7 @@ from hybridsim.expr.grammar import (
     MAX_INTEGER,
     MAX_POWER,
     RESERVED,
+    STAIRS,
 )
 from hybridsim.expr.walk import NoValue, value_of
 
@@ -35,16 +36,9 @@ _DOTS = "a dot stands between the name of a part and the name of its quantity, s
 
 
 # What to write instead of calls that are no functions of expressions.
-_QUANTIZER = (
-    "declare an element of kind 'quantizer', whose value is the multiple of `step` nearest to its `input`"
-)
 _INSTEAD = {
     "v_rel": "v_rel exists only in results; write the velocity of the contact, or a definition of it",
-    "round": _QUANTIZER,
-    "floor": f"{_QUANTIZER}; for floor(x), use the input x - 0.5 and the step 1",
-    "ceil": f"{_QUANTIZER}; for ceil(x), use the input x + 0.5 and the step 1",
-    "mod": "mod(t, T) is an input of kind 'wave' and shape 'sawtooth' with the period T, the amplitude T/2 and the "
-    "offset T/2; mod(x, d) is x minus an element of kind 'quantizer' with the input x - d/2 and the step d",
+    "ceil": "write -floor(-x) for ceil(x)",
     "delay": "declare an element of kind 'delay'",
 }
 
@@ -151,7 +145,7 @@ class _Checker:
     def name(self, node: ast.expr, name: str) -> bool:
         if name in CONSTANTS:
             return True
-        if name in FUNCTIONS:
+        if name in FUNCTIONS and name not in STAIRS:
             raise self.fail(
                 node, f"the function '{name}' has no arguments here", f"write {name}(...) with arguments"
             )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import math
+import operator
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -34,6 +35,15 @@ def _sign(x: float) -> float:
     return float((x > 0) - (x < 0))
 
 
+def _floor(x: float) -> float:
+    return float(math.floor(x))
+
+
+def _round(x: float) -> float:
+    whole = math.floor(x)
+    return float(whole + (x - whole >= 0.5))  # x + 0.5 could be rounded up to a whole number
+
+
 FUNCTIONS: Mapping[str, Function] = MappingProxyType(
     {
         "sin": Function(1, 1, math.sin),
@@ -53,12 +63,19 @@ FUNCTIONS: Mapping[str, Function] = MappingProxyType(
         "sign": Function(1, 1, _sign),
         "min": Function(2, _MAX_ARGUMENTS, min),
         "max": Function(2, _MAX_ARGUMENTS, max),
+        "floor": Function(1, 1, _floor),
+        "mod": Function(2, 2, operator.mod),
+        "round": Function(1, 1, _round),
     }
 )
+# Functions that jump at whole numbers. A model may use these names for its own quantities too, such as a force `floor`.
+STAIRS = frozenset({"floor", "mod", "round"})
 CONSTANTS: Mapping[str, float] = MappingProxyType({"pi": math.pi})
 TIME = "t"
 RESERVED = (
-    frozenset(FUNCTIONS) | frozenset(CONSTANTS) | {TIME, "True", "False", "and", "or", "not", "if", "else"}
+    (frozenset(FUNCTIONS) - STAIRS)
+    | frozenset(CONSTANTS)
+    | {TIME, "True", "False", "and", "or", "not", "if", "else"}
 )
 
 # A name: an identifier, or the names of nested parts and an identifier with dots between them.

@@ -40,7 +40,7 @@ _ADVICE = {
     "&": "write 'and' instead of '&'",
     "|": "write 'or' instead of '|'",
     "~": "write 'not' instead of '~'",
-    "%": "the remainder is not available; declare a periodic signal as an input of kind 'wave'",
+    "%": "write mod(x, d) for the remainder x - d*floor(x/d)",
     "[": "expressions cannot contain lists or subscripts; part 3 of the repeated part 'block' is block3",
     "{": "expressions cannot contain sets or tables",
     ":": "expressions cannot contain slices, lambdas or assignments",
@@ -213,8 +213,10 @@ def substitute(expr: Expression, values: Mapping[str, Expression | str | float])
 
 def of_tree(tree: ast.expr, place: Place | None = None) -> Expression:
     """Return an expression from a checked tree, which may contain internal names."""
-    identifiers = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
-    return Expression(write(tree), frozenset(identifiers - CONSTANTS.keys() - FUNCTIONS.keys()), place, tree)
+    nodes = list(ast.walk(tree))
+    functions = {id(node.func) for node in nodes if isinstance(node, ast.Call)}
+    names = {node.id for node in nodes if isinstance(node, ast.Name) and id(node) not in functions}
+    return Expression(write(tree), frozenset(names - CONSTANTS.keys()), place, tree)
 
 
 def check_text(text: str, where: Place, also: str = "") -> None:

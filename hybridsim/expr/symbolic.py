@@ -34,6 +34,22 @@ class exp(sympy.exp):  # SymPy's printers use the name of the class
         return self.func(self.args[0] * other) if other.is_real else None
 
 
+class floor(sympy.Function):
+    """The largest whole number at or below an argument; its derivative is zero."""
+
+    @classmethod
+    def eval(cls, arg: Any) -> Any:
+        """Return the value at a number, or None."""
+        return sympy.floor(arg) if arg.is_Number else None
+
+    def fdiff(self, argindex: int = 1) -> Any:
+        """Return the derivative, zero."""
+        return sympy.Integer(0)
+
+    def _eval_is_extended_real(self) -> Any:
+        return self.args[0].is_extended_real
+
+
 _FUNCTIONS: dict[str, Any] = {
     "sin": sympy.sin,
     "cos": sympy.cos,
@@ -52,6 +68,9 @@ _FUNCTIONS: dict[str, Any] = {
     "sign": sympy.sign,
     "min": sympy.Min,
     "max": sympy.Max,
+    "floor": floor,
+    "mod": lambda x, d: x - d * floor(x / d),
+    "round": lambda x: floor(x + sympy.Rational(1, 2)),
 }
 _RELATIONS: dict[type[ast.cmpop], Any] = {
     ast.Lt: sympy.Lt,

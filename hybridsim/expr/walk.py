@@ -1,13 +1,13 @@
-"""Evaluate a checked tree in double precision by a recursive walk."""
+"""Evaluate a checked tree in double precision by a recursive walk, and find calls that jump."""
 
 from __future__ import annotations
 
 import ast
 import math
 import operator
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 
-from hybridsim.expr.grammar import CONSTANTS, FUNCTIONS
+from hybridsim.expr.grammar import CONSTANTS, FUNCTIONS, STAIRS
 
 _BINARY: dict[type[ast.operator], Callable[[float, float], float]] = {
     ast.Add: operator.add,
@@ -65,6 +65,13 @@ def value_of(node: ast.expr, values: Mapping[str, float]) -> float | bool:
         case ast.Call(func=ast.Name(id=name), args=args):
             return _finite(node, FUNCTIONS[name].value, *(value_of(arg, values) for arg in args))
     raise TypeError(f"a checked expression cannot contain {ast.dump(node)}")
+
+
+def stairs_in(tree: ast.AST) -> Iterator[ast.Call]:
+    """Yield the calls of floor, mod and round in a tree."""
+    for part in ast.walk(tree):
+        if isinstance(part, ast.Call) and isinstance(part.func, ast.Name) and part.func.id in STAIRS:
+            yield part
 
 
 def _finite(node: ast.expr, function: Callable[..., float], *arguments: float) -> float:

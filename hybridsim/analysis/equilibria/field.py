@@ -30,6 +30,12 @@ class Field:
                 f"model {system.model.name} consists of Python functions, whose derivatives are unknown",
                 remedy="write the model in expressions",
             )
+        if system.numbers:
+            raise UsageError(
+                f"model {system.model.name} contains floor, mod or round, whose whole numbers depend on the state: "
+                "equilibria and linearisations are not supported",
+                remedy="replace the function by a parameter, and choose its value",
+            )
         self.system, self.z, self.t, self.by_state = system, z, t, by_state
         self.p = system.vector(Instant(t), system.discrete_start)
         self.guards = np.flatnonzero(system.active(z))

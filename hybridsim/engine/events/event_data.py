@@ -44,6 +44,8 @@ class EventData:
         # Taylor series by modes, and the arrays at which they were computed; those are replaced, never modified
         self.series: dict[bytes, Series] = {}
         self.behind: tuple[object, ...] = (None,) * 4
+        # run-time vectors by modes in which whole numbers differ from those of a present vector
+        self.vectors: dict[bytes, tuple[np.ndarray, np.ndarray]] = {}
         self.is_kinked = False  # whether a corner changed its side: the flow is continuous, its slope is not
         self.scope = set(range(components)) if scope is None else set(scope)
         self.rank: dict[int, int] = {}  # position of each guard in the order in which they reached zero
@@ -56,16 +58,21 @@ class EventData:
                 guards = enumerate(automaton.guards[automaton.hold])
                 self.released_to[c] = next((j for j, g in guards if g in located), NO_SIDE)
 
-    def series_of(self, z: np.ndarray, x: np.ndarray | None = None) -> Series:
-        """Return the Taylor series along the flow of the modes `z`, at the present state or at `x`."""
-        at = self.at
+    def series_of(self, z: np.ndarray, x: np.ndarray | None = None, p: np.ndarray | None = None) -> Series:
+        """Return the Taylor series along the flow of the modes `z`, at the present state or at `x`.
+
+        p : the run-time vector; by default the present one, with the whole numbers that belong to `z`.
+        """
+        at, key = self.at, z.tobytes()
         x = at.x if x is None else x
-        behind = (at.s, x, at.p, at.x_error)
+        if p is None:
+            present, found = self.vectors.get(key, (None, at.p))
+            p = found if present is at.p else at.p
+        behind = (at.s, x, p, at.x_error)
         if not all(a is b for a, b in zip(behind, self.behind, strict=True)):
             self.behind, self.series = behind, {}
-        key = z.tobytes()
         if key not in self.series:
-            self.series[key] = self.system.series(at.s, x, at.p, z, at.x_error, at.s_error, at.is_put)
+            self.series[key] = self.system.series(at.s, x, p, z, at.x_error, at.s_error, at.is_put)
         return self.series[key]
 
     def fired_guards(self) -> list[tuple[int, int, int]]:

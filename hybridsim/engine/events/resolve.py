@@ -12,7 +12,7 @@ from hybridsim.engine.events.choice.cluster_choice import ClusterChoice
 from hybridsim.engine.events.choice.guards_of_one_target import guards_taken_together
 from hybridsim.engine.events.choice.surface_intersection import message_on_cascade
 from hybridsim.engine.events.choice.verdict import LEAVES, UNDECIDED, side_after
-from hybridsim.engine.events.corner_sides import take_corners
+from hybridsim.engine.events.corner_sides import message_on_numbers, take_corners
 from hybridsim.engine.events.fatal_guards import message_of_leaving, message_of_located
 from hybridsim.engine.events.first_modes import as_read_by_conditions, certainly_leaving
 from hybridsim.engine.events.jumps.impact import strike
@@ -80,7 +80,8 @@ class EventResolution(ClusterChoice):
                 if v == UNDECIDED:
                     self._note_undecided(c)
             if not leaving:
-                return self._done()
+                several = message_on_numbers(self) if self.forward else ""
+                return self._stop("nonunique", several) if several else self._done()
             fatal = message_of_leaving(self.system, self.at.z, leaving, self.sides)
             if fatal:
                 return self._stop("inconsistent", fatal)

@@ -94,7 +94,8 @@ class Located:
     def is_event(self, system: System) -> bool:
         """Return whether there is an event at the end of the run; changes of branch in abs, min or max do not count."""
         owners = set(system.owner[list(self.fired)].tolist())
-        return bool(owners.difference(system.led)) or bool(self.monitors.leads.any())
+        silent = set(system.led).difference(system.numbers)
+        return bool(owners.difference(silent)) or bool(self.monitors.leads.any())
 
     def resolved(
         self,
@@ -199,7 +200,8 @@ def _as_due(
 
 def others_near(system: System, at: Situation, series: Any, arrival: Arrival, share: float) -> bool:
     """Return whether another guard or monitor is smaller than `share` times its error bound."""
-    active = set(map(int, np.flatnonzero(system.active(at.z) & ~system.is_corner[system.owner])))
+    is_read = ~system.is_corner[system.owner] | np.isin(system.owner, [*system.numbers])
+    active = set(map(int, np.flatnonzero(system.active(at.z) & is_read)))
     monitors = set(range(len(series.monitors))) - set(arrival.stopping)
     values = [(series.guards[g][0], series.guard_bounds[g][0]) for g in active.difference(arrival.fired)]
     values += [(series.monitors[k][0], series.monitor_bounds[k][0]) for k in monitors]

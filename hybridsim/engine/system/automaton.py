@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from hybridsim.model.parts.component import Corner, LoadAutomaton
+from hybridsim.model.parts.component import Corner, LoadAutomaton, WholeNumber
 from hybridsim.model.smoothing.jumps import SIGN
 
 CORNER = "corner"  # kind of the event in which a corner changes its side
@@ -29,7 +29,8 @@ class Automaton:
     is_unilateral: bool = False  # its surface is a gap: there is no mode below
     is_unique: bool = False  # a switching surface: one motion alone must be admissible
     is_corner: bool = False  # a corner: both modes agree at the border
-    is_step: bool = False  # a corner whose modes may differ at the border: a step in time
+    is_step: bool = False  # a corner whose sides may differ at the border: a step in time, or a whole number
+    number: str = ""  # the discrete state that is the whole number of floor
     is_load: bool = False  # the load of a contact that opens
     limit: int = -1  # mode that is entered at the limit of its transitions
 
@@ -60,6 +61,7 @@ def automaton_of(component: Any, guards: tuple[tuple[int, ...], ...]) -> Automat
     """Return a component of a model as the engine represents it."""
     names = tuple(m.name for m in component.modes)
     surface = component.surface
+    number = component.number if isinstance(component, WholeNumber) else ""
     return Automaton(
         component.name,
         names,
@@ -80,7 +82,9 @@ def automaton_of(component: Any, guards: tuple[tuple[int, ...], ...]) -> Automat
         is_unilateral=bool(surface and surface.is_unilateral),
         is_unique=bool(surface and surface.unique),
         is_corner=isinstance(component, Corner),
-        is_step=isinstance(component, Corner) and any(v.startswith(SIGN) for v in component.variables),
+        is_step=(isinstance(component, Corner) and any(v.startswith(SIGN) for v in component.variables))
+        or number != "",
+        number=number,
         is_load=isinstance(component, LoadAutomaton),
         limit=names.index(component.limit.to) if component.limit else -1,
     )

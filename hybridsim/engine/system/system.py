@@ -60,6 +60,9 @@ class _Frame:
         self.may_bounce = bool((self.is_unilateral | ~(self.has_surface | self.is_corner)).any())
         # corners and loads: their modes follow from the state
         self.led = tuple(c for c, a in enumerate(self.automata) if a.is_corner or a.is_load)
+        # places of whole numbers in the run-time vector, by component
+        discrete = {d.name: self.layout.discrete_at + k for k, d in enumerate(model.discrete)}
+        self.numbers = {c: discrete[a.number] for c, a in enumerate(self.automata) if a.number}
         self.declared = self.automata[: len(self.automata) - int(self.is_corner.sum())]  # without corners
         self.component_numbers = np.arange(len(self.automata))
         self.initial_modes = np.array([a.initial for a in self.automata], dtype=np.int64)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from hybridsim.engine.events.choice.verdict import side_after, side_before
+from hybridsim.engine.events.corner_sides import take_corners
 from hybridsim.engine.events.diagnosis import power_without_value
 from hybridsim.engine.events.first_modes import as_read_by_conditions
 from hybridsim.engine.events.input_jumps import surfaces_jump
@@ -359,7 +360,7 @@ class FixedStepRun:
         self.origin = instant
         p = self._vector()
         before = np.where(starting, self.task.z0, self.z)
-        x, sides = self.x, np.sign(self._monitors(0.0, self.x, p))
+        x = self.x
         # the located event lies within the last halving of a step
         s_error = self.located if fired or monitors else 0.0
         x_error = 4.0 * UNIT * np.maximum(np.abs(self.x), _scale(self.states))
@@ -372,6 +373,10 @@ class FixedStepRun:
         resets: list[tuple[object, ...]] = [("schedule", k) for k in schedules]
         resets += [("monitor", k) for k in monitors]
         resolution = EventResolution(system, at, before, forward=True, scope=self.declared)
+        if starting:  # monitors read the whole numbers of the start
+            take_corners(resolution)
+            p = at.p
+        sides = np.sign(self._monitors(0.0, x, p))
         resolution.jumped = surfaces_jump(system, instant, at, forward=True)
         outcome = resolution.run(fired, resets)
         self.x, self.discrete = outcome.x, system.discrete(outcome.p).copy()

@@ -98,7 +98,7 @@ def _unit(node: ast.expr, known: Mapping[str, str], definitions: Mapping[str, as
             return "" if of(right) else of(left)
         case ast.IfExp(body=body):
             return of(body)
-        case ast.Call(func=ast.Name(id="abs" | "max" | "min"), args=args):
+        case ast.Call(func=ast.Name(id="abs" | "max" | "min" | "mod"), args=args):
             return next((unit for arg in args if (unit := of(arg))), "")
     return ""
 

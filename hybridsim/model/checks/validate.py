@@ -15,6 +15,7 @@ from hybridsim.model.checks.signals import check_signals
 from hybridsim.model.checks.surfaces import check_surfaces
 from hybridsim.model.checks.values import check_values, errors_of_numbers
 from hybridsim.model.checks.velocity_powers import check_velocity_powers
+from hybridsim.model.checks.whole_numbers import check_whole_numbers
 from hybridsim.model.parts.model import Model
 
 
@@ -43,6 +44,8 @@ def find_errors(model: Model) -> tuple[ModelError, ...]:
     check_functions(scope)
     check_drawing(scope)
     check_expressions(scope)
+    if not scope.errors:
+        check_whole_numbers(scope)
     if not scope.errors:
         check_velocity_powers(scope)
     if not scope.errors:

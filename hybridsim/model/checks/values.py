@@ -12,6 +12,7 @@ from hybridsim.expr import Expression, evaluate
 from hybridsim.expr.evaluate import dependency_order
 from hybridsim.model.checks.impacts import check_restitution
 from hybridsim.model.checks.scope import Findings
+from hybridsim.model.checks.whole_numbers import divisors
 from hybridsim.model.elements.requirement import Requirement
 from hybridsim.model.laws.law import SPEED
 from hybridsim.model.parts.contact import Contact
@@ -104,6 +105,8 @@ def _all_checks(model: Model) -> Iterator[_Check]:
         yield check(_contact, contact, contact.normal, *_forces_at_points(contact))
     for requirement in model.requirements:
         yield check(_requirement, requirement, requirement.low, requirement.high)
+    for divisor in divisors(model):
+        yield check(_divisor, divisor, divisor)
     for impact in model.impacts:
         yield check(check_restitution, impact, impact.restitution)
 
@@ -145,6 +148,13 @@ def _requirement(findings: Findings, requirement: Requirement, values: dict[str,
         low, high = (_value(findings, expr, values) for expr in (requirement.low, requirement.high))
         if low is not None and high is not None and not requirement.is_met(low, high):
             findings.fail(requirement, *requirement.fault(low, high))
+
+
+def _divisor(findings: Findings, divisor: Expression, values: dict[str, float]) -> None:
+    if _value(findings, divisor, values) == 0.0:
+        findings.errors.append(
+            divisor.error(f"the divisor '{divisor.text}' of mod is 0", remedy="use another number")
+        )
 
 
 def _value(findings: Findings, expr: Expression, values: dict[str, float]) -> float | None:

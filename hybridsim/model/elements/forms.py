@@ -8,6 +8,8 @@ from typing import Any
 
 from hybridsim.errors import nearest
 from hybridsim.expr import Expression, parse, parse_reset, substitute
+from hybridsim.expr.walk import stairs_in
+from hybridsim.expr.write import write
 from hybridsim.model.elements.element import Element
 from hybridsim.model.elements.guard_direction import without_directions
 from hybridsim.model.elements.quantizer_readers import refuse_readers
@@ -22,6 +24,10 @@ _FORMULAS = {
     "saturation": "min(max(input, lower), upper)",
     "deadband": "max(input - upper, 0) + min(input - lower, 0)",
 }
+_CONTINUOUS = (
+    "use a continuous input whose rate has the same formula in all modes, or write the backlash as "
+    "a component with modes"
+)
 # Numbers of steps that a quantizer takes at once where its input jumps, or has another value at the start than 0.
 _STRIDES = tuple(2**k for k in range(13, 0, -1))
 
@@ -147,13 +153,14 @@ class _Forms:
     def _rate(self, element: Element) -> Expression:
         """Return the rate of a backlash's input; raise an error if the input or its rate jumps."""
         title = f"element {element.name}: the input"
-        jumping = _jumping(self.model)
-        for name in sorted(inlined(element.input, dict(self.definitions)).names):
+        jumping, whole = _jumping(self.model), inlined(element.input, dict(self.definitions))
+        for call in stairs_in(whole.tree):
+            raise element.error(f"{title} of a backlash contains '{write(call)}', which jumps", _CONTINUOUS)
+        for name in sorted(whole.names):
             if name in jumping:
                 raise element.error(
                     f"{title} of a backlash depends on '{name}', {jumping[name]}",
-                    "use a continuous input whose rate has the same formula in all modes, or write the backlash as "
-                    "a component with modes",
+                    _CONTINUOUS,
                 )
         constants: tuple[Declared, ...] = (*self.model.parameters, *self.model.discrete)
         return rate_along(element.input, title, self.model.states, self.definitions, constants)

@@ -10,14 +10,14 @@ from itertools import pairwise
 from typing import TypeVar
 
 from hybridsim.errors import Place
-from hybridsim.expr.grammar import CONSTANTS, FUNCTIONS, TIME
+from hybridsim.expr.grammar import CONSTANTS, TIME
 from hybridsim.expr.increment import HEAD, Increment
 from hybridsim.expr.parse import Expression
 from hybridsim.expr.rebuild import rebuilt
 from hybridsim.expr.write import write
 
 Kind = TypeVar("Kind", bound=Expression)
-_FIXED = frozenset({TIME, *CONSTANTS, *FUNCTIONS})
+_FIXED = frozenset({TIME, *CONSTANTS})
 
 
 def prefixed(expr: Kind, prefix: str, use: str, own: Collection[str] = ()) -> Kind:
@@ -27,10 +27,13 @@ def prefixed(expr: Kind, prefix: str, use: str, own: Collection[str] = ()) -> Ki
     """
     place = (expr.place or Place()).inside(use)
     fixed = _FIXED.union(own)
-    nodes = [node for node in ast.walk(expr.tree) if isinstance(node, ast.Name) and node.id not in fixed]
+    parts = list(ast.walk(expr.tree))
+    functions = {id(part.func) for part in parts if isinstance(part, ast.Call)}
+    names = [part for part in parts if isinstance(part, ast.Name) and id(part) not in functions]
+    nodes = [name for name in names if name.id not in fixed]
     if not nodes:
         return replace(expr, place=place)
-    names = frozenset(name if name in fixed else prefix + name for name in expr.names)
+    renamed = frozenset(name if name in fixed else prefix + name for name in expr.names)
     head = HEAD if isinstance(expr, Increment) else ""
     if all(hasattr(node, "col_offset") for node in nodes):
         starts = sorted(node.col_offset for node in nodes)
@@ -41,7 +44,7 @@ def prefixed(expr: Kind, prefix: str, use: str, own: Collection[str] = ()) -> Ki
     else:  # an expression that was derived from others: its columns belong to several texts
         tree = _prefixed(expr.tree, prefix, fixed, None)
         text = write(tree)
-    return replace(expr, text=head + text, names=names, place=place, tree=tree)
+    return replace(expr, text=head + text, names=renamed, place=place, tree=tree)
 
 
 def _prefixed(node: ast.expr, prefix: str, fixed: Collection[str], starts: list[int] | None) -> ast.expr:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import ast
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from hybridsim.expr import Expression
+from hybridsim.expr import Expression, parse
 from hybridsim.model.parts.declared import Declared, as_tuple
 from hybridsim.model.parts.frozen_map import FrozenMap
 
@@ -274,6 +275,25 @@ class Corner(Component):
     other component, but results list it separately from the declared components
     (`hybridsim.model.smoothing.explicit_corners`).
     """
+
+
+@dataclass(frozen=True)
+class WholeNumber(Corner):
+    """A corner made for ``floor(u)``: one mode, with the guards u < k + 1 and u >= k of the discrete state k.
+
+    Parameters
+    ----------
+    number : name of the discrete state k, which jumps.
+    argument : the expression u.
+    """
+
+    number: str = field(default="", kw_only=True)
+    argument: Expression = field(default=parse(0), kw_only=True)
+
+    @property
+    def call(self) -> ast.expr:
+        """The syntax tree of floor(u)."""
+        return ast.Call(ast.Name("floor", ast.Load()), [self.argument.tree], [])
 
 
 @dataclass(frozen=True)

@@ -279,7 +279,8 @@ class Model(Declared):
     def with_values_of(self, other: Model) -> Model:
         """Return a copy with the values of another model with the same parameters and states."""
         states = tuple(replace(s, start=o.start) for s, o in zip(self.states, other.states, strict=True))
-        copy = self._valued(states=states, parameters=other.parameters, discrete=other.discrete)
+        hidden = self.discrete[len(other.discrete) :]  # whole numbers of floor, mod and round
+        copy = self._valued(states=states, parameters=other.parameters, discrete=(*other.discrete, *hidden))
         vars(copy)["_values"] = other._values
         return copy
 

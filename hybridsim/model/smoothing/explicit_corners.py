@@ -22,6 +22,7 @@ from hybridsim.model.smoothing.jumps import not_linear
 from hybridsim.model.smoothing.nonsmooth import MODE, Primitive, sides_of, uses_primitives
 from hybridsim.model.smoothing.rewriting import Rewriting
 from hybridsim.model.smoothing.rewriting_state import IN_EVENTS, IN_VELOCITY, Found, Here
+from hybridsim.model.smoothing.whole_numbers import with_whole_numbers
 
 # Largest number of corners and jumps to replace. Each event checks all components, and compiled loops store a table of
 # the combinations of modes.
@@ -47,7 +48,8 @@ def smoothed(model: Model) -> Model:
 
 def _smoothed(model: Model) -> Model | None:
     """Return the smoothed model, which copies with other values share, or None if nothing changes."""
-    result = smoothing_of(model).model if uses_primitives(model) else model
+    result = with_whole_numbers(model)
+    result = smoothing_of(result).model if uses_primitives(result) else result
     return None if result is model else result
 
 
@@ -61,6 +63,7 @@ def smoothing_of(model: Model) -> Smoothed:
     """
     if model.flow is not None:
         return Smoothed(model, ())
+    model = with_whole_numbers(model)
     refused: dict[Family, str] = {}
     shared: frozenset[Family] = frozenset()
     timed: frozenset[Family] = frozenset()

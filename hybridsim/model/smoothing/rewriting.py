@@ -407,7 +407,7 @@ class Rewriting(RewritingState):
     def _title(self, node: ast.expr) -> str:
         taken = {component.name for component in self.components} | {c.name for c in self.corners.values()}
         taken |= {jump.name for jump in self.jumps.values()}
-        title = write(node)
+        title = write(with_names(node, self.shown))
         while title in taken:
             title += "'"
         return title
@@ -415,6 +415,8 @@ class Rewriting(RewritingState):
     def note(self, node: ast.expr, became: str, remark: str, here: Here) -> None:
         if not here.where:
             return
-        where, _ = self._accounts.setdefault((write(node), became, remark), ([], here.place))
+        where, _ = self._accounts.setdefault(
+            (write(with_names(node, self.shown)), became, remark), ([], here.place)
+        )
         if here.where not in where:
             where.append(here.where)

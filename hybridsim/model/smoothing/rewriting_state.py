@@ -10,6 +10,7 @@ from types import MappingProxyType
 from hybridsim.errors import ModelError, Place
 from hybridsim.expr.rebuild import rebuilt
 from hybridsim.model.meanings import Family, Meanings
+from hybridsim.model.parts.component import WholeNumber
 from hybridsim.model.parts.model import Model
 from hybridsim.model.smoothing.continuity import is_continuous
 from hybridsim.model.smoothing.jumps import Borders, Jump
@@ -81,6 +82,8 @@ class RewritingState:
         self.has_jumps = self._has_sign or uses_conditions(model)
         self._parameters = {parameter.name for parameter in model.parameters} | lasting(model)
         self.components = model.all_components()
+        # whole numbers by name, as titles show them
+        self.shown = {c.number: c.call for c in self.components if isinstance(c, WholeNumber)}
         self.signs = [[self.meanings.signs(c, mode) for mode in c.modes] for c in self.components]
         self.corners: dict[Family, Found] = {}
         self.jumps: dict[Family, Jump] = {}

@@ -23,8 +23,10 @@ Units = Mapping[str, Unit]
 _COUNT = 4
 # Exponents such as 0.7 are fractions with at most this denominator.
 _DENOMINATOR = 100
-_OF_NUMBERS = frozenset({"sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log"})
-_OF_ALIKE = frozenset({"min", "max"})
+_OF_NUMBERS = frozenset(
+    {"sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log", "floor", "round"}
+)
+_OF_ALIKE = frozenset({"min", "max", "mod"})
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from hybridsim.errors import UsageError
 from hybridsim.model import Model
-from hybridsim.model.parts.component import Corner
+from hybridsim.model.parts.component import Corner, WholeNumber
 from hybridsim.model.smoothing.explicit_corners import smoothed
 from hybridsim.reference.trajectory import Trajectory
 
@@ -79,6 +79,11 @@ def multiple_precision_trajectory(
     if names := ", ".join(c.name for c in model.components if c.surface and c.surface.unique):
         raise UsageError(
             f"rates of model {model.name} jump ({names}): the multiple-precision run does not support sliding",
+            remedy="compare with another integrator at a tight tolerance, or with a closed form",
+        )
+    if any(isinstance(component, WholeNumber) for component in model.components):
+        raise UsageError(
+            f"model {model.name} contains floor, mod or round, which the multiple-precision run does not support",
             remedy="compare with another integrator at a tight tolerance, or with a closed form",
         )
     corners = {component.name for component in model.components if isinstance(component, Corner)}

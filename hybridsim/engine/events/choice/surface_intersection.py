@@ -141,10 +141,28 @@ def refused(resolution: EventVerdicts, members: list[int], message: str) -> tupl
 
 def message_on_cascade(resolution: EventVerdicts) -> str:
     """Return a hint on transitions that repeat without end, or an empty text."""
-    for make_message in (_message_on_opposed_modes, _message_on_negative_guard, _message_on_drift):
+    for make_message in (
+        _message_on_numbers,
+        _message_on_opposed_modes,
+        _message_on_negative_guard,
+        _message_on_drift,
+    ):
         if found := make_message(resolution):
             return found
     return ""
+
+
+def _message_on_numbers(resolution: EventVerdicts) -> str:
+    """Return a hint on a motion that would slide along a whole value of the argument of floor, else an empty text."""
+    system = resolution.system
+    negative = system.active(np.maximum(resolution.at.z, 0)) & (resolution.sides < 0)
+    names = [system.automata[c].name for c in system.numbers if c in system.owner[negative]]
+    if not names:
+        return ""
+    return (
+        f". The motion leads back to the jump of {names[-1]} from both sides, and would slide along it, which is not "
+        "supported: write this jump with sign(...), along whose zero a motion can slide"
+    )
 
 
 def _message_on_drift(resolution: EventVerdicts) -> str:

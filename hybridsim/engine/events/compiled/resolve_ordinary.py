@@ -61,11 +61,12 @@ def is_alone(automata: Any, tapes: Any, lin: Any, k: int, fired: int, z: Any, wo
 
 
 @inlined
-def way_back(automata: Any, c: int, mode: int, to: int) -> int:
-    """Return the guard of `mode` whose transition leads to the mode `to`, or NOBODY."""
+def way_back(automata: Any, c: int, mode: int, to: int, fired: int) -> int:
+    """Return the guard of `mode`, other than the fired one, whose transition leads to the mode `to`, or NOBODY."""
     for j in range(automata.guards_of.shape[2]):
-        if automata.guards_of[c, mode, j] >= 0 and automata.target[c, mode, j, 0] == to:
-            return int(automata.guards_of[c, mode, j])
+        g = automata.guards_of[c, mode, j]
+        if g >= 0 and g != fired and automata.target[c, mode, j, 0] == to:
+            return int(g)
     return NOBODY
 
 
@@ -169,7 +170,7 @@ def resolve_ordinary(
             measure_point(lin, work)
         number, continuous, vector = 0, False, p
         work.is_zero[fired] = False
-        back = way_back(automata, c, z[c], at.z[c]) if automata.is_corner[c] else NOBODY
+        back = way_back(automata, c, z[c], at.z[c], fired) if automata.is_corner[c] else NOBODY
         if back >= 0:
             work.is_zero[back] = True  # a corner is at zero on both sides
         put(z, work.now)
