@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -289,11 +288,6 @@ class WholeNumber(Corner):
 
     number: str = field(default="", kw_only=True)
     argument: Expression = field(default=parse(0), kw_only=True)
-
-    @property
-    def call(self) -> ast.expr:
-        """The syntax tree of floor(u)."""
-        return ast.Call(ast.Name("floor", ast.Load()), [self.argument.tree], [])
 
 
 @dataclass(frozen=True)

@@ -83,7 +83,11 @@ class RewritingState:
         self._parameters = {parameter.name for parameter in model.parameters} | lasting(model)
         self.components = model.all_components()
         # whole numbers by name, as titles show them
-        self.shown = {c.number: c.call for c in self.components if isinstance(c, WholeNumber)}
+        self.shown = {
+            c.number: ast.Call(ast.Name("floor", ast.Load()), [c.argument.tree], [])
+            for c in self.components
+            if isinstance(c, WholeNumber)
+        }
         self.signs = [[self.meanings.signs(c, mode) for mode in c.modes] for c in self.components]
         self.corners: dict[Family, Found] = {}
         self.jumps: dict[Family, Jump] = {}
