@@ -15,8 +15,9 @@ from hybridsim.engine.record.segments import Segment
 from hybridsim.engine.run.headway import cost
 from hybridsim.engine.system.instant import Instant
 from hybridsim.engine.system.system_cache import system_of
-from hybridsim.errors import SimulationError
+from hybridsim.errors import SimulationError, UsageError
 from hybridsim.model import Model
+from hybridsim.model.smoothing.whole_numbers import with_whole_numbers
 from hybridsim.simulate import simulate
 from hybridsim.solution import Solution
 
@@ -100,6 +101,12 @@ class Motion:
         first: dict[str, Any] | None = None,
         progress: Callable[[float], None] | None = None,
     ) -> None:
+        if with_whole_numbers(model) is not model:
+            raise UsageError(
+                f"model {model.name} contains floor, mod or round: steady states, sections and Lyapunov exponents need "
+                "derivatives through their jumps, which are not supported",
+                remedy="use hs.simulate, or hs.sweep with `t_span`",
+            )
         self.model, self.options, self.first = model, options, first or {}
         self.progress = progress
         self.names = [s.name for s in model.states]

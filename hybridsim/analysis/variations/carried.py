@@ -66,6 +66,12 @@ class Carrier:
                 f"model {solution.model.name} consists of Python functions, whose derivatives are unknown",
                 remedy="write the model in expressions",
             )
+        if self.system.numbers:
+            raise UsageError(
+                f"model {solution.model.name} contains floor, mod or round: derivatives through their jumps are not "
+                "supported",
+                remedy="use differences of runs",
+            )
         largest = sizes(solution)
         self._scale = np.where(largest > 0.0, largest, 1.0)
         self._vector = VectorSlopes(self.system, solution._segments[0].origin, tables)

@@ -199,8 +199,15 @@ def test_what_must_be_continuous_refuses_them(parts: dict[str, object], message:
 
 
 def test_other_questions_refuse_them_by_name() -> None:
-    model = hs.Model("m", states=[hs.State("x", 1, "0.5 - x + floor(x)")])
-    for ask in (lambda: hs.to_ivp(model, {}), lambda: hs.equilibria(model)):
+    states = [hs.State("x", 1, "a - x + floor(x)")]
+    model = hs.Model("m", parameters=[hs.Parameter("a", 0.5)], states=states)
+    for ask in (
+        lambda: hs.to_ivp(model, {}),
+        lambda: hs.equilibria(model),
+        lambda: hs.sensitivities(hs.simulate(model, (0, 1)), ["a"]),
+        lambda: hs.steady_state(model, period=1.0),
+        lambda: hs.lyapunov_exponents(model, 10.0),
+    ):
         with pytest.raises(UsageError, match="contains floor, mod or round"):
             ask()
 
