@@ -199,7 +199,7 @@ def test_what_must_be_continuous_refuses_them(parts: dict[str, object], message:
 
 
 def test_other_questions_refuse_them_by_name() -> None:
-    states = [hs.State("x", 1, "a - x + floor(x)")]
+    states = [hs.State("x", 1.2, "a - x + floor(x)")]
     model = hs.Model("m", parameters=[hs.Parameter("a", 0.5)], states=states)
     for ask in (
         lambda: hs.to_ivp(model, {}),
