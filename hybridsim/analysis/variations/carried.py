@@ -68,8 +68,7 @@ class Carrier:
             )
         if self.system.numbers:
             raise UsageError(
-                f"model {solution.model.name} contains floor, mod or round: derivatives through their jumps are not "
-                "supported",
+                f"model {solution.model.name} contains floor, mod or round, through which derivatives are unknown",
                 remedy="use differences of runs",
             )
         largest = sizes(solution)
