@@ -7,14 +7,13 @@ continues.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 
 import numpy as np
 
 from hybridsim.engine.record.blocks import OccurrenceList, SegmentList
 from hybridsim.engine.record.counters import Counters
 from hybridsim.engine.record.segments import Segment
-from hybridsim.engine.record.trajectory import Task, Trajectory
+from hybridsim.engine.record.trajectory import Trajectory
 from hybridsim.engine.run.stepping import Flow
 from hybridsim.engine.system.system import System
 from hybridsim.model.checks.denominators import Denominator, denominators
@@ -27,12 +26,6 @@ _HALVINGS = 60
 # thresholds lie half way between.
 _NEAR, _PART, _ULPS = 1e-2, 1e-2, 4.0
 _ROUNDING = 1e-9  # of the rates: a smaller relative change is rounding
-# A pole is at the end of a run if it is nearer than this many relative tolerances of the time span. Over the last
-# hundredth of this distance a rate then grows by the first factor, and since earlier states by the second factor.
-_WITHIN, _GROWS, _GROWN = 10.0, 3.0, 1e3
-_STEEP = (
-    1e3  # a rate that would change its state by less than this factor in the time span belongs to no pole
-)
 _REMEDY = "end the run earlier by a monitor, or change the rate so that its denominator stays away from zero"
 
 
@@ -133,51 +126,6 @@ def end_at_pole(system: System, trajectory: Trajectory) -> None:
         f"after t = {float(ended.end):.9g}: the denominator {divisor.text} in the rate of {divisor.state} "
         f"passes zero. The rates have a pole or a jump there, so the motion cannot be continued: {_REMEDY}"
     )
-
-
-def may_end_at_pole(system: System, trajectory: Trajectory, task: Task) -> bool:
-    """Return whether some rates at the end of a run are large or not numbers, as they are near a pole."""
-    if system.n == 0 or not trajectory.segments:
-        return False
-    last = trajectory.segments[-1]
-    x = last.x[-1]
-    rates = Flow(system, last.p, last.z, Counters()).rhs(float(last.s[-1]), x)
-    sizes = np.maximum(np.abs(x), np.abs(task.x0))
-    return not (np.abs(rates) * abs(task.t1 - task.t0) <= _STEEP * sizes).all()
-
-
-def end_before_pole(system: System, trajectory: Trajectory, task: Task) -> None:
-    """Change the status of a run that ends so near to a pole that its last states are arbitrary numbers."""
-    if trajectory.status != "finished" or not may_end_at_pole(system, trajectory, task):
-        return
-    segment, within = trajectory.segments[-1], _WITHIN * task.tolerances.rtol * (task.t1 - task.t0)
-    end, flow = float(segment.s[-1]), Flow(system, segment.p, segment.z, Counters())
-    begin = float(segment.s[0])
-    times = np.array([end - within, end - _NEAR * within])
-    if abs(times[0] - end) > abs(end - begin) or not within:
-        return
-    far, near = (np.abs(flow.rhs(t, x)) for t, x in zip(times.tolist(), segment.dense(times), strict=True))
-    earlier = np.array([np.abs(rates) for rates in _earlier_rates(system, trajectory, task)])
-    grows = (near > _GROWS * far) & (near > _GROWN * earlier.max(axis=0))
-    if not grows.any():
-        return
-    state = system.names[int(np.argmax(np.where(grows, near, 0.0)))]
-    trajectory.forget_checkpoint()
-    trajectory.status = "step-failure"
-    trajectory.message = (
-        f"after t = {float(segment.end):.9g}: the rate of {state} grows without bound at the end of the run. "
-        f"There may be a pole, so the last values are arbitrary: {_REMEDY}"
-    )
-
-
-def _earlier_rates(system: System, trajectory: Trajectory, task: Task) -> Iterator[np.ndarray]:
-    """Yield the rates at some states of a run before its last steps, and the mean rates since the start."""
-    segments = list(trajectory.segments[-_LOOKS:])
-    yield (segments[-1].x[-1] - task.x0) / (task.t1 - task.t0)
-    for segment in segments:
-        flow = Flow(system, segment.p, segment.z, Counters())
-        times = np.linspace(segment.s[0], segment.s[0] + 0.5 * (segment.s[-1] - segment.s[0]), 4)
-        yield from (flow.rhs(t, x) for t, x in zip(times.tolist(), segment.dense(times), strict=True))
 
 
 def passed_unseen(system: System, trajectory: Trajectory, x0: np.ndarray, t0: float) -> list[str]:

@@ -15,7 +15,7 @@ from hybridsim.errors import RunInterrupted
 from hybridsim.model.checks.denominators import denominators
 from hybridsim.model.checks.doubtful import jumps_of, touches_of
 from hybridsim.solution.model_trajectory import ModelTrajectory
-from hybridsim.solution.poles import end_at_pole, end_before_pole, may_end_at_pole, passed_unseen
+from hybridsim.solution.poles import end_at_pole, passed_unseen
 from hybridsim.solution.run import Run
 from hybridsim.solution.solution import Solution
 
@@ -30,7 +30,7 @@ def carried_out(
     wall_time = time.perf_counter() - began - within
     if isinstance(trajectory, LazyTrajectory):
         trajectory.then(partial(_close, run))
-        if denominators(run.model) or may_end_at_pole(run.system, trajectory, run.task):
+        if denominators(run.model):
             trajectory.whole()
     else:
         _close(run, trajectory)
@@ -51,7 +51,6 @@ def _close(run: Run, trajectory: Trajectory) -> None:
     for caution in (*jumps_of(run.model), *touches_of(run.model)):
         trajectory.warnings[caution.sentence] = 1
     end_at_pole(run.system, trajectory)
-    end_before_pole(run.system, trajectory, run.task)
     for sentence in passed_unseen(run.system, trajectory, run.task.x0, run.task.t0):
         trajectory.warn(sentence)
     if run.task.t0 == run.task.t1:

@@ -88,36 +88,3 @@ def test_what_cannot_pass_zero_or_is_kept_away_is_not_looked_at() -> None:
 
 def test_a_negative_power_is_a_division() -> None:
     assert [d.text for d in denominators(braked("B*(v - r*w)*v**-1"))] == ["v"]
-
-
-# A rate, the time of its pole, and the start; the last rate has no pole, but is large near the end.
-AT_THE_END = {
-    "x**2": (1.0, 1.0),
-    "x**3": (0.5, 1.0),
-    "exp(x)": (1.0, 0.0),
-    "1 + x**2": (math.pi / 2.0, 0.0),
-    "1/(1 - t)": (1.0, 0.0),
-    "1/(1 - t)**2": (1.0, 0.0),
-}
-
-
-@pytest.mark.parametrize("integrator", ["taylor", "dop853", "tsit5", "rodas5p", "scipy-rk45", "scipy-radau"])
-@pytest.mark.parametrize("rate", AT_THE_END)
-def test_a_run_to_a_pole_is_not_finished(rate: str, integrator: str) -> None:
-    end, start = AT_THE_END[rate]
-    model = hs.Model("pole", states=[hs.State("x", start, rate)])
-    for keep in ("all", "nothing"):
-        for _ in range(2):  # the second run repeats the first one
-            sol = hs.simulate(model, (0.0, end), integrator=integrator, keep=keep)
-            assert sol.status == "step-failure" and not sol.success
-            assert sol.t_end == pytest.approx(end, rel=1e-8)
-    before = hs.simulate(model, (0.0, end - 1e-5), integrator=integrator)
-    assert before.success
-
-
-@pytest.mark.parametrize("rate", ["30*x + 0*x**2", "-1e5*(x - cos(t)) + 0*x**2", "1/(1.0001 - t)"])
-def test_large_rates_at_the_end_are_no_pole(rate: str) -> None:
-    model = hs.Model("steep", states=[hs.State("x", 1, rate)])
-    for integrator in ("auto", "rodas5p"):
-        assert hs.simulate(model, (0.0, 1.0), integrator=integrator).status == "finished"
-    assert hs.simulate(model, (0.0, 1.0), integrator="rodas5p", rtol=1e-4).status == "finished"

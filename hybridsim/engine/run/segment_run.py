@@ -287,7 +287,7 @@ class SegmentRun:
         return want in (0, direction)
 
     def _is_recorded(self, hit: Hit, first: tuple[Hit, bool] | None) -> bool:
-        """Return whether a monitor's crossing only has to be recorded, and no event comes before it in the step."""
+        """Return whether a monitor that only records has its zero before any event of the step."""
         is_before = first is None or hit.theta < first[0].theta
         recorded = self.monitors[hit.number].action == "record"
         return is_before and recorded and self._fires_in(hit.number, hit.direction)

@@ -74,7 +74,7 @@ class KnownTimes(NamedTuple):
         )
 
     def of_like_lengths(self) -> KnownTimes:
-        """Return the known times before the length of the input intervals changes its order of magnitude."""
+        """Return the known times as long as the input intervals have lengths of one order of magnitude."""
         m = int(np.argmax(self.lengths != self.lengths[0]))
         if m == 0:
             return self

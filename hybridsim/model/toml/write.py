@@ -115,7 +115,7 @@ def _law(law: FrictionLaw) -> dict[str, Any]:
 
 
 def _parameters(law: FrictionLaw) -> Any:
-    """Return the parameters of a law; a list if one has neither a default nor a unit, since TOML has no null."""
+    """Return the parameters of a law. They are a list of names if one of them has neither a default nor a unit."""
     declared = {name: {"value": value, "unit": law.units.get(name)} for name, value in law.parameters.items()}
     entries = _short("value", declared)
     bare = {name for name, entry in declared.items() if not any(map(_is_set, entry.values()))}

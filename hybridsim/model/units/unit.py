@@ -50,7 +50,7 @@ class Unit:
 
     @property
     def dimension(self) -> Powers:
-        """The powers of the base units that have a dimension."""
+        """The powers of those base units that have a dimension, so without angles."""
         return tuple((name, power) for name, power in self.powers if name not in _ANGLES)
 
     @property

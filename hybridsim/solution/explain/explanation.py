@@ -341,7 +341,7 @@ def _segment_before(solution: Solution, occurrence: Occurrence) -> Segment | Non
 
 
 def _met(system: System, at: Situation, fired: list[int]) -> list[int]:
-    """Return the guards that reached zero together with the fired guards and would become negative."""
+    """Return further guards that are zero at the event and would become negative just after it."""
     series = system.series(at.s, at.x, at.p, at.z, at.x_error, at.s_error)
     found = []
     for g in np.flatnonzero(system.active(at.z)):
