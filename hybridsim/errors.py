@@ -153,7 +153,7 @@ class ModelError(HybridsimError):
         return self._errors or (self,)
 
     def inside(self, use: str) -> tuple[ModelError, ...]:
-        """Return every single error as seen from a model that contains the faulty model as its part ``use``."""
+        """Return the errors of a part as errors of the model that uses the part under the name ``use``."""
         return tuple(
             type(error)(error.message, place=(error.place or Place()).inside(use), remedy=error.remedy)
             for error in self.errors

@@ -99,7 +99,7 @@ def contacts_without_stick(model: Model, with_stick: Collection[str]) -> dict[st
 def velocity_of(
     contact: Contact, values: Mapping[str, np.ndarray], times: np.ndarray, parameters: Mapping[str, float]
 ) -> np.ndarray:
-    """Return the relative velocity (k,) of a contact at times (k,), from the values (k,) of what it reads."""
+    """Return the relative velocity (k,) of a contact at times (k,), from the values (k,) of its variables."""
     names = (*values, TIME)
     rows = zip(*(column.tolist() for column in (*values.values(), times)), strict=True)
     known = (dict(parameters) | dict(zip(names, row, strict=True)) for row in rows)

@@ -162,7 +162,7 @@ class Trace(Lines):
         names |= replaced
 
     def read(self, array: str, i: int) -> Value:
-        """Return an element of an array that the generated function never writes."""
+        """Return an element of an array. The generated function only reads this array."""
         return Value(self, self.load(array, i))
 
     def branch(self, condition: _Condition) -> bool:

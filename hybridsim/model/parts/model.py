@@ -437,7 +437,7 @@ class Model(Declared):
         return frozenset(constants)
 
     def variables(self) -> dict[str, Component]:
-        """Return the variables that components set, each with its component; contact forces are included."""
+        """Return each variable that a component sets, with the component. Contact forces are included."""
         return {name: component for component in self.all_components() for name in component.variables}
 
     def structure(self) -> str:

@@ -28,7 +28,7 @@ _COPY = re.compile(r"(?<=\w)\d+(?=\.[A-Za-z_])")  # the number of a copy in a na
 
 @dataclass(frozen=True)
 class UnitOfExpression:
-    """The unit of one expression, the reasons if it is unknown, and warnings that no other expression has."""
+    """The unit of one expression, the reasons if the unit is unknown, and the warnings of this expression."""
 
     statement: Statement
     unit: Unit | None

@@ -104,7 +104,7 @@ def check_header(header: Header) -> None:
         check_number("the time at which another integrator took over", taken_over[1])
     kinds = header["kinds"]
     if not (isinstance(kinds, list) and all(isinstance(kind, str) for kind in kinds)):
-        raise ValueError("a kind of block is not a string")
+        raise ValueError("the `kind` of a block is not a string")
     if header["save"] not in ("all", "events", "last-period", "nothing"):
         check_number("the save setting", header["save"], 0.0)
     retention = header["keep"]
