@@ -108,7 +108,7 @@ def _change_of_number(
         return nearest  # the flow there decides next
     if not has_flow:
         return 0.0
-    if zero is None and is_first and nearest == 1.0:
+    if is_first and nearest == 1.0:
         return 1.0
     side_of = side_after if resolution.forward else side_before
     side, _ = side_of(series.guards[down], series.guard_bounds[down], 1)

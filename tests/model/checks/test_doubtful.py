@@ -31,7 +31,10 @@ def test_no_packaged_model_is_suspected(name: str) -> None:
 
 @pytest.mark.parametrize("path", SCENES, ids=lambda path: path.stem)
 def test_no_scene_is_suspected(path: Path) -> None:
-    assert warnings_of(hs.load(path)) == ()
+    """Except that of two monitors of a gap, which fire only when the ball rests."""
+    found = warnings_of(hs.load(path))
+    assert [caution.message for caution in found if "only touches zero" not in caution.message] == []
+    assert len(found) == (2 if path.stem == "bounces-watched" else 0)
 
 
 @pytest.mark.parametrize(

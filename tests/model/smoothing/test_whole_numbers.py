@@ -99,6 +99,22 @@ def test_a_motion_falls_to_a_jump_and_rests(integrator: str, options: dict[str, 
     assert sol.output("n", 2.0) == 0.0
 
 
+@pytest.mark.parametrize("integrator", ["exact", "taylor", "dop853", "tsit5", "rodas5p", "cvode-bdf"])
+def test_a_body_that_stops_at_a_whole_value_has_this_number(integrator: str) -> None:
+    """A block stops at t = 2 and a ball that does not bounce lands at t = 1; then floor(0) is 0, and mod(0, 1) is 0."""
+    contact = hs.Contact("f", "v", "1", "coulomb", arguments={"mu": 1})
+    states = [hs.State("v", 2, "-f"), hs.State("y", 0, "floor(v)"), hs.State("z", 0, "mod(v, 1)")]
+    sol = hs.simulate(hs.Model("m", states=states, contacts=[contact]), (0, 4), integrator=integrator)
+    assert sol.y[:, -1] == pytest.approx([0.0, 1.0, 1.0], abs=1e-8)
+    states = [hs.State("h", 1, "w"), hs.State("w", 0, "-2 + p"), hs.State("y", 0, "floor(h)")]
+    sol = hs.simulate(
+        hs.Model("m", states=states, impacts=[hs.Impact("p", "h", restitution=0)]),
+        (0, 3),
+        integrator=integrator,
+    )
+    assert sol.y[:, -1] == pytest.approx([0.0, 0.0, 0.0], abs=1e-8)
+
+
 @pytest.mark.parametrize("integrator", ["dop853", "exact"])
 def test_everything_at_one_instant_reads_the_new_number(integrator: str) -> None:
     """A tick counts whole turns at t = 1, where x = 2 exactly; the output and a monitor jump there."""
