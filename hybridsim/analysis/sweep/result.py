@@ -120,7 +120,7 @@ class Sweep(Readable):
     def columns(self) -> dict[str, np.ndarray]:
         """Return axes, results and status as columns, one row per point; arrays become ``name[0]``, ...
 
-        A result with the name of another column gets an underscore: a result "status" is the column "status_".
+        A result with the name of another column gets an underscore: the result ``status`` is the column ``status_``.
         """
         if self.mode == "grid":
             grids = np.meshgrid(*self.axes.values(), indexing="ij")
