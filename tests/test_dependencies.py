@@ -27,8 +27,6 @@ NOT_IMPORTED = {
     "myst-parser": "an extension of Sphinx that docs/conf.py names",
     "pydata-sphinx-theme": "the theme that docs/conf.py names",
 }
-# A test of the site skips without these.
-OF_SITE = {"sphinx", "docutils"}
 # Calls that import what their argument names.
 IMPORTING = {"import_module", "importorskip", "library", "find_spec"}
 
@@ -76,7 +74,7 @@ def test_the_package_imports_what_it_declares() -> None:
 
 
 def test_the_tests_import_what_the_package_and_their_extra_declare() -> None:
-    needed = of_others("tests") - OF_SITE
+    needed = of_others("tests")
     assert needed <= modules([*PROJECT["dependencies"], *EXTRAS["test"]])
     assert modules(EXTRAS["test"]) <= needed | of_others("hybridsim")
 

@@ -12,7 +12,7 @@ from hybridsim.analysis.polynomials.orbit import NODES, POINTS, TO_COEFFICIENTS,
 from hybridsim.solution import Solution
 
 _TAIL = 4  # last coefficients, which show whether the polynomial is accurate
-# of half a interval; samples keep this distance from the ends, where sign(v) may be determined by rounding
+# of half an interval; samples keep this distance from the ends, where sign(v) may be determined by rounding
 _ASIDE_OF_ENDS = 2.0**-26
 _RESOLVED = 1e-13  # the misfit relative to the largest value of the whole run
 _HOLDS = 1e-6  # if rounding exceeds this fraction of a quantity, no polynomial represents it

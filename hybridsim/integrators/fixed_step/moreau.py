@@ -16,7 +16,7 @@ from hybridsim.integrators.fixed_step.method import FixedStepMethod
 from hybridsim.integrators.fixed_step.moreau_impacts import UNILATERAL
 from hybridsim.integrators.fixed_step.moreau_kernels import moreau_step, moreau_steps, scratch_for
 from hybridsim.integrators.fixed_step.moreau_loads import refuse_loads_of_friction
-from hybridsim.integrators.fixed_step.run import surface_table
+from hybridsim.integrators.fixed_step.surface_table import surface_table
 from hybridsim.model.parts.impact import ROUNDING
 
 _HALVINGS = 16  # halvings of a step in which a declared guard or monitor crosses zero

@@ -13,8 +13,9 @@ from hybridsim.engine.native.model_functions import evaluate
 from hybridsim.engine.system.system import System
 from hybridsim.integrators.fixed_step.march import March
 from hybridsim.integrators.fixed_step.rk4_kernels import run_steps, workspace
-from hybridsim.integrators.fixed_step.run import ROWS, surface_table
+from hybridsim.integrators.fixed_step.run import ROWS
 from hybridsim.integrators.fixed_step.step_code import SIGN, ZONE, StepCode, step_functions
+from hybridsim.integrators.fixed_step.surface_table import surface_table
 
 _run_steps = Precompiled(run_steps)
 

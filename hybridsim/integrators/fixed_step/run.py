@@ -37,6 +37,7 @@ from hybridsim.integrators.fixed_step.kernels import (
 )
 from hybridsim.integrators.fixed_step.march import March
 from hybridsim.integrators.fixed_step.step_length import refuse_endless
+from hybridsim.integrators.fixed_step.surface_table import surface_table
 
 _STATE = ("x", "z", "discrete", "fresh", "turned")  # attributes from which a run can continue, with the scale
 ROWS = 8192  # most steps per kernel call; each call has a new time origin, so that no digits are lost
@@ -58,21 +59,6 @@ def _checkpoint(
 ) -> Checkpoint:
     """Return a checkpoint that includes the largest absolute value of each state."""
     return Checkpoint(instant, arrays | {"scale": _scale(states)}, *others)
-
-
-def surface_table(system: System) -> np.ndarray:
-    """Return the numbers of component, modes and guards for each component with a surface.
-
-    The entries of a gap that do not exist are -1.
-    """
-    return np.array(
-        [
-            (c, a.above, a.below, a.hold, *((*a.guards[a.hold], -1)[:2]))
-            for c, a in enumerate(system.automata)
-            if a.has_surface
-        ],
-        dtype=np.int64,
-    ).reshape(-1, 6)
 
 
 class FixedStepRun:

@@ -32,7 +32,7 @@ _STRUCTURES = 64  # most recently used structures whose functions stay in memory
 class StepCode:
     """The properties of a model and the options on which the step functions depend.
 
-    table: see `hybridsim.integrators.fixed_step.run.surface_table`. forcing: number of values of the forcing.
+    table: see `hybridsim.integrators.fixed_step.surface_table`. forcing: number of values of the forcing.
     """
 
     n: int

@@ -280,9 +280,8 @@ class Model(Declared):
         """Return a copy with the values of another model with the same parameters and states."""
         states = tuple(replace(s, start=o.start) for s, o in zip(self.states, other.states, strict=True))
         hidden = self.discrete[len(other.discrete) :]  # whole numbers of floor, mod and round
-        copy = self._valued(states=states, parameters=other.parameters, discrete=(*other.discrete, *hidden))
-        vars(copy)["_values"] = other._values
-        return copy
+        discrete, values = (*other.discrete, *hidden), other._values
+        return self._valued(states=states, parameters=other.parameters, discrete=discrete, _values=values)
 
     def _valued(self, **parts: Any) -> Model:
         """Return a copy that differs only in values and shares all other results with the model."""

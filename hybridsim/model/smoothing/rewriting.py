@@ -13,11 +13,7 @@ from hybridsim.expr.write import write
 from hybridsim.model.meanings import Family
 from hybridsim.model.parts.switching import blend
 from hybridsim.model.smoothing.conditions import TooManyConditions, single_comparisons
-from hybridsim.model.smoothing.continuity import (
-    has_root_beside_sign,
-    rooted_in,
-    sides_of_product,
-)
+from hybridsim.model.smoothing.continuity import has_root_beside_sign, rooted_in, sides_of_product
 from hybridsim.model.smoothing.hoisting import jump_inside
 from hybridsim.model.smoothing.jumps import SIGN, Jump, product_of_signs
 from hybridsim.model.smoothing.nonsmooth import (
