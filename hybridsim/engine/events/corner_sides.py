@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from hybridsim.engine.series.short_series import Series
     from hybridsim.engine.system.automaton import Automaton
 
+_FAR = 1e-6  # a guard of a whole number that is located at zero is nearer to zero than this
 _ROUNDS_PER_MODE = 4  # orders of a series: each order settles at least one more component
 
 
@@ -49,6 +50,8 @@ def sides_along(
         for c in system.led:
             automaton, mode = system.automata[c], int(z[c])
             if c in system.numbers:
+                if c in zero and abs(values[zero[c], 0]) > max(bounds[zero[c], 0], _FAR):
+                    del zero[c]  # a jump of the state has passed the zero
                 change = _change_of_number(resolution, series, c, zero.get(c), has_flow, number == 0)
                 if change != 0.0:
                     vector = p.copy() if vector is p else vector

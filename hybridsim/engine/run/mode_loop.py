@@ -292,7 +292,7 @@ class ModeLoop:
             if result.passed is not None and result.passed.last is not None:
                 self.timetable.mark_done(result.passed.last)
                 steps, x_before = self.record.counters.steps - result.passed.steps, result.passed.x
-            counted = ~self.system.is_continuous[result.owners]
+            counted = self.system.may_accumulate[result.owners]
             limit = self.accumulation.limit_of_all(result.instants[counted], result.owners[counted])
             if limit is None and len(result.owners) and not self.system.has_surface[result.owners[-1]]:
                 blocks = self.record.occurrences.blocks

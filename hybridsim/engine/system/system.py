@@ -53,8 +53,9 @@ class _Frame:
                 self.owner[list(numbers)] = c
         self.has_surface = np.array([a.has_surface for a in self.automata], dtype=np.bool_)
         self.is_corner = np.array([a.is_corner for a in self.automata], dtype=np.bool_)
-        # corners whose rates are the same on both sides
-        self.is_continuous = np.array([a.is_corner and not a.is_step for a in self.automata], dtype=np.bool_)
+        # not corners with the same rates on both sides, nor whole numbers, which only follow their arguments
+        follows = [a.is_corner and (not a.is_step or a.number != "") for a in self.automata]
+        self.may_accumulate = ~np.array(follows, dtype=np.bool_)
         self.is_unilateral = np.array([a.is_unilateral for a in self.automata], dtype=np.bool_)
         # true for impacts or resets; friction and relays alone do not bounce
         self.may_bounce = bool((self.is_unilateral | ~(self.has_surface | self.is_corner)).any())

@@ -384,7 +384,7 @@ class FixedStepRun:
             self._monitor_events(instant, np.flatnonzero(left), -sides.astype(np.int64), self.x)
         if outcome.status:
             record.status, record.message = outcome.status, f"at t = {float(instant)!r}: {outcome.message}"
-        changed = {c.component for c in outcome.changes if not system.is_continuous[c.component]}
+        changed = {c.component for c in outcome.changes if system.may_accumulate[c.component]}
         limit = self.accumulation.limit(instant, tuple(sorted(changed)))
         if limit is not None:
             record.status = "accumulation"

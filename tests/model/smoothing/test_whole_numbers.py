@@ -235,3 +235,31 @@ def test_the_hidden_numbers_are_no_quantities_of_a_solution() -> None:
     assert [(corner.component, corner.t) for corner in sol.corners] == [("floor(x)", 0.5), ("floor(x)", 1.5)]
     with pytest.raises(HybridsimError):
         sol.output("whole_1", 1.0)
+
+
+@pytest.mark.parametrize("integrator", ["exact", "taylor", "dop853", "tsit5", "rodas5p", "cvode-bdf"])
+@pytest.mark.parametrize(("g", "e"), [(2.0, 0.5), (9.81, 0.7)])
+def test_an_impact_moves_an_argument_by_several_whole_values(integrator: str, g: float, e: float) -> None:
+    """A ball falls from h = 1 and bounces until it rests; floor(w) is summed over the unit intervals of its speed."""
+    states = [hs.State("h", 1, "w"), hs.State("w", 0, f"p - {g}"), hs.State("y", 0, "floor(w)")]
+    model = hs.Model(
+        "m",
+        states=states,
+        impacts=[hs.Impact("p", "h", restitution=e)],
+        outputs=[hs.Output("n", "mod(w, 1)")],
+    )
+    sol = hs.simulate(model, (0, 6), integrator=integrator)
+    assert sol.status == "finished"
+
+    def primitive(w: float) -> float:
+        """Return the integral of floor from 0 to w."""
+        k = math.floor(w)
+        return k * (k - 1) / 2 + k * (w - k)
+
+    hit = math.sqrt(2 * g)
+    total = (primitive(0.0) - primitive(-hit)) / g
+    while hit > 1e-13:
+        hit *= e
+        total += (primitive(hit) - primitive(-hit)) / g
+    assert sol.y[2, -1] == pytest.approx(total, abs=1e-6)
+    assert sol.output("n", 6.0) == 0.0

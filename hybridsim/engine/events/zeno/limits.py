@@ -154,7 +154,7 @@ def counted_components(
 ) -> tuple[tuple[int, ...], tuple[int, ...]]:
     """Return the contacts that an event has closed, and the components whose events may accumulate.
 
-    Rates are the same on both sides of a continuous corner, so its events do not count: the motion goes on.
+    Events of continuous corners and of whole numbers do not count, because the motion goes on after them.
     """
     automata = system.automata
     closed = tuple(
@@ -166,7 +166,7 @@ def counted_components(
     if closed and not changed:
         return closed, ()
     changed = changed or {int(system.owner[g]) for g in fired} or {NOBODY}
-    return closed, tuple(sorted(c for c in changed if c == NOBODY or not system.is_continuous[c]))
+    return closed, tuple(sorted(c for c in changed if c == NOBODY or system.may_accumulate[c]))
 
 
 def holds_several(system: System, outcome: Outcome) -> bool:
